@@ -15,6 +15,7 @@ from bt_actions.traffic.state import Record
 
 if TYPE_CHECKING:
     from bt_actions.ros.log import Log
+    from bt_actions.ros.rosout import Rosout
     from bt_actions.ros.spinning import Spinner
 
 
@@ -65,3 +66,17 @@ def log() -> Log:
     from bt_actions.ros.log import log
 
     return log
+
+
+def rosout(node: Any) -> Rosout:
+    """Return what speaks on `/rosout` for a node, and prints nothing."""
+    from bt_actions.ros.rosout import Rosout
+
+    return Rosout(node)
+
+
+def declare_input(node: Any, *given: Any) -> bool:
+    """Show an input as a parameter of a node; see ros/parameters.py."""
+    from bt_actions.ros.parameters import declare_input
+
+    return declare_input(node, *given)

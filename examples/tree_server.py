@@ -30,10 +30,9 @@ def main() -> None:
     except KeyboardInterrupt:
         pass
     finally:
-        server.drain()  # cancels what still runs, waits until it has ended, and answers the clients
+        server.close()  # cancels what still runs, waits until it has ended, and answers the clients
         executor.shutdown()
         spinning.join()
-        server.close()
         node.destroy_node()
         rclpy.try_shutdown()
 

@@ -15,19 +15,19 @@ from typing import Any
 
 import pytest
 
-from bt_actions.goals.ids import new_goal_id
 from bt_actions.recovery import ledger as module
 from bt_actions.recovery.ledger import KEPT_FOR, LENGTH, Ledger, Sent, left_behind
 from bt_actions.traffic.state import Entry
+from bt_actions.utilities.ids import new_id
 from tests.support import records
 
 SERVERS = frozenset({b"a" * 16, b"b" * 16})
 LEAVES = """
 import os, sys
-from bt_actions.goals.ids import new_goal_id
+from bt_actions.utilities.ids import new_id
 from bt_actions.recovery.ledger import Ledger
 from bt_actions.traffic.state import Entry
-ledger, ids = Ledger(print), [new_goal_id() for _ in range(4)]
+ledger, ids = Ledger(print), [new_id() for _ in range(4)]
 for number, goal_id in enumerate(ids):
     servers = frozenset({b"a" * 16})
     ledger.enter(goal_id, Entry(f"/robot_{number}/move", number, servers, accept=60.0))
@@ -115,7 +115,7 @@ def test_that_a_server_is_not_in_sight_is_kept() -> None:
 
 
 def test_nothing_is_found_of_who_is_alive(ledger: Ledger, directory: Path) -> None:
-    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    ledger.enter(new_id(), Entry("/move", 0, SERVERS))
     assert len(on_record(directory)) == 1
     assert found() == []
 
@@ -126,7 +126,7 @@ def test_what_was_read_before_is_passed_over() -> None:
 
 
 def test_what_more_is_known_of_a_goal_takes_its_place(ledger: Ledger, directory: Path) -> None:
-    goal_id = new_goal_id()
+    goal_id = new_id()
     ledger.enter(goal_id, Entry("/move", 0, SERVERS, lost=True))
     assert goal_id in ledger
     ledger.enter(goal_id, Entry("/move", 0, frozenset(), accept=1e9))
@@ -138,7 +138,7 @@ def test_what_more_is_known_of_a_goal_takes_its_place(ledger: Ledger, directory:
 
 
 def test_the_child_of_a_fork_leaves_its_parents_file_alone(ledger: Ledger, directory: Path) -> None:
-    goal_id = new_goal_id()
+    goal_id = new_id()
     ledger.enter(goal_id, Entry("/move", 0, SERVERS))
     child = os.fork()
     if not child:
@@ -159,7 +159,7 @@ def test_without_room_it_complains_once_and_the_goal_goes_on(
 
     monkeypatch.setattr(module.os, "posix_fallocate", fail)
     for _ in range(3):
-        ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+        ledger.enter(new_id(), Entry("/move", 0, SERVERS))
     (complaint,) = complaints
     assert "No space left on device" in complaint
 
@@ -186,8 +186,8 @@ def test_a_directory_that_others_may_have_made_is_not_used(
         else:
             somebody = os.geteuid() + 1
             monkeypatch.setattr(module.os, "geteuid", lambda: somebody)
-    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
-    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    ledger.enter(new_id(), Entry("/move", 0, SERVERS))
+    ledger.enter(new_id(), Entry("/move", 0, SERVERS))
     assert len(complaints) == 1
     assert found() == []
     assert [trouble.filename for trouble in troubles] == [str(directory)]
@@ -204,7 +204,7 @@ def test_a_directory_that_depends_on_where_one_stands_is_refused(
     ledger: Ledger, complaints: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(module.DIRECTORY, "records")
-    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    ledger.enter(new_id(), Entry("/move", 0, SERVERS))
     assert "no absolute path" in complaints[0]
     assert found() == []
     assert [trouble.filename for trouble in troubles] == ["records"]
@@ -215,7 +215,7 @@ WRONG = (
     {"accept": math.inf}, {"accept": "x"}, {"accept": -1}, {"action": ["x"]}, {"domain": "0"},
     {"goal": 1}, {"goal": "00" * 16},
 )  # fmt: skip
-DEAD = new_goal_id()[:6] + (2**22 + 1).to_bytes(4, "big") + b"ab"
+DEAD = new_id()[:6] + (2**22 + 1).to_bytes(4, "big") + b"ab"
 
 
 def put(directory: Path, *texts: bytes) -> None:
@@ -271,13 +271,13 @@ def test_the_next_process_removes_what_nobody_wants(
         os.utime(dead, (past, past))
     else:
         dead.write_bytes(b"\0" * LENGTH)
-    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    ledger.enter(new_id(), Entry("/move", 0, SERVERS))
     assert dead not in directory.iterdir()
     assert len(on_record(directory)) == 1
 
 
 def test_who_ends_leaves_nothing_unless_a_goal_is_open(ledger: Ledger, directory: Path) -> None:
-    answered, is_open = new_goal_id(), new_goal_id()
+    answered, is_open = new_id(), new_id()
     ledger.enter(answered, Entry("/move", 0, SERVERS))
     ledger.enter(is_open, Entry("/move", 0, SERVERS))
     ledger.strike(answered)
@@ -293,15 +293,15 @@ def test_who_ends_leaves_nothing_unless_a_goal_is_open(ledger: Ledger, directory
 def test_a_file_is_as_old_as_what_is_on_it(
     ledger: Ledger, directory: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    ledger.enter(new_id(), Entry("/move", 0, SERVERS))
     [path] = directory.iterdir()
     os.utime(path, (0.0, 0.0))
     monkeypatch.setattr(ledger, "_touched_at", 0.0)
-    ledger.enter(new_goal_id(), Entry("/move", 0, SERVERS))
+    ledger.enter(new_id(), Entry("/move", 0, SERVERS))
     assert time.time() - path.stat().st_mtime < KEPT_FOR
     path.unlink()  # as who logs out may have all of /dev/shm removed
     monkeypatch.setattr(ledger, "_touched_at", 0.0)
-    ledger.enter(new_goal_id(), Entry("/move", 1, SERVERS))
+    ledger.enter(new_id(), Entry("/move", 1, SERVERS))
     assert [each["domain"] for each in on_record(directory)] == [1]
 
 

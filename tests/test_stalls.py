@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bt_actions.servers.reachability import DOUBT_LASTS
-from bt_actions.servers.stalls import (
+from bt_actions.traffic.stalls import (
     ANSWERS_TAKE,
     BACK_IN_SIGHT,
     IN_A_ROW,

@@ -16,6 +16,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Connected
+from bt_actions.behaviours.places import root_of
 from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.events.kinds import AttemptEnded
@@ -28,7 +29,6 @@ from bt_actions.messages.fields import fields_in_words
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.drain import drain
-from bt_actions.utilities.places import root_of
 from bt_actions.utilities.shorten import shorten
 
 if TYPE_CHECKING:

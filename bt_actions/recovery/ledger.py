@@ -2,7 +2,7 @@
 
 A server shows the goals that it has accepted. Of one that it has received, and has not decided on
 yet, nobody knows but the sender, and a sender that is killed tells nobody; the robot moves later.
-So each process has a file, named by what its goals' ids begin with (goals/ids.py), with a slot for
+So each process has a file, named by what its goals' ids begin with (ids.py), with a slot for
 each goal without an answer. The file outlives a process that is killed, and cleanup reads it
 (recovery/sweep.py). It lies in memory (/dev/shm), in a directory that only this user may write to,
 and is mapped: a call of the system's for each goal would give Python's lock away.
@@ -26,8 +26,8 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bt_actions.goals.ids import Author, author_of
 from bt_actions.traffic.state import Entry, Record
+from bt_actions.utilities.ids import Author, author_of
 
 DIRECTORY = "BT_ACTIONS_LEDGER"
 """The environment variable that names another directory: one that outlives a container, say."""

@@ -1,7 +1,7 @@
 """Finds and cancels goals that a killed orchestrator left on servers it can no longer speak to.
 
 A process that dies by SIGKILL cancels nothing. Its goals are found in the status topics of all
-actions in sight, told by their ids (goals/ids.py), and canceled one by one; goals of other clients,
+actions in sight, told by their ids (ids.py), and canceled one by one; goals of other clients,
 and of orchestrators that are alive, or that cannot be looked for from here, are never touched. No
 action type is needed for any of it. That a server has nothing to tell is believed when it has
 answered for long enough (roll_call.py).
@@ -22,13 +22,13 @@ from pathlib import Path
 from typing import Any
 
 from bt_actions.goals.asking import DENIED_FOR_GOOD
-from bt_actions.goals.ids import Author, author_of
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import CANCEL_TERMINATED, CANCEL_UNKNOWN_GOAL, ENDS, NEVER
 from bt_actions.recovery.ledger import Sent, left_behind
 from bt_actions.recovery.roll_call import ASK_AGAIN, GONE, SETTLE, LeftBehind, RollCall
 from bt_actions.ros.onlooker import ActionView, CannotStart, Onlooker, onlooker
-from bt_actions.servers.stalls import Stalls
+from bt_actions.traffic.stalls import Stalls
+from bt_actions.utilities.ids import Author, author_of
 
 TURN = 0.1
 """Seconds between two looks for what has come in, at the graph, and for who is still alive."""

@@ -18,7 +18,7 @@ from bt_actions.document import place_of
 from bt_actions.render.graphviz import RenderError, draw
 from bt_actions.render.look import (
     DOWN_UP_TO,
-    Row,
+    NodeRow,
     direction_of,
     label,
     left_out,
@@ -32,8 +32,8 @@ from bt_actions.utilities.whole_file import replace_file
 __all__ = [
     "DOWN_UP_TO",
     "FORMATS",
+    "NodeRow",
     "RenderError",
-    "Row",
     "action_of",
     "content",
     "dot",
@@ -126,7 +126,7 @@ def write(
         raise RenderError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def _label(row: Row) -> str:
+def _label(row: NodeRow) -> str:
     name, under = label(row.node)
     small = "<br/>".join(html.escape(line) for line in (*under, left_out(row)) if line)
     large = "<br/>".join(html.escape(line) for line in name)

@@ -31,7 +31,7 @@ _LOOKS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class NodeRow:
     """One node of a tree in reading order."""
 
     node: Behaviour
@@ -42,12 +42,12 @@ class Row:
     """Nodes below this one that are left out."""
 
 
-def rows(root: Behaviour, *, depth: int | None = None) -> Iterator[Row]:
+def rows(root: Behaviour, *, depth: int | None = None) -> Iterator[NodeRow]:
     """Yield every node below and including `root`, parents first; not bounded by recursion.
 
     With `depth`, only nodes of so many levels below the root; who has more below tells how many.
     """
-    waiting = [Row(root, 0, ())]
+    waiting = [NodeRow(root, 0, ())]
     while waiting:
         row = waiting.pop()
         if row.depth == depth:
@@ -56,19 +56,19 @@ def rows(root: Behaviour, *, depth: int | None = None) -> Iterator[Row]:
         yield row
         last = len(row.node.children) - 1
         waiting.extend(
-            Row(child, row.depth + 1, (*row.branches, index != last))
+            NodeRow(child, row.depth + 1, (*row.branches, index != last))
             for index, child in reversed(list(enumerate(row.node.children)))
         )
 
 
-def direction_of(nodes: Iterable[Row], direction: str | None = None) -> str:
+def direction_of(nodes: Iterable[NodeRow], direction: str | None = None) -> str:
     """Return "down" or "right": `direction` itself, or by the number of leaves where it is None."""
     if direction is not None:
         return direction
     return "down" if sum(not row.node.children for row in nodes) <= DOWN_UP_TO else "right"
 
 
-def left_out(row: Row) -> str:
+def left_out(row: NodeRow) -> str:
     """Return what a picture says of the nodes below `row` that it does not show, or nothing."""
     return f"+ {row.folded:,} more" if row.folded else ""
 

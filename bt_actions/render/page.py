@@ -27,7 +27,7 @@ from bt_actions.behaviours.kinds import action_of, kind
 from bt_actions.document import place_of
 from bt_actions.render.card import Table, describe, interface_of, tables
 from bt_actions.render.graphviz import RenderError
-from bt_actions.render.look import Row, direction_of, label, look, rows
+from bt_actions.render.look import NodeRow, direction_of, label, look, rows
 from bt_actions.render.outline import text
 from bt_actions.render.written import document_of, node_of, own_text
 from bt_actions.utilities.plain_text import clean
@@ -67,7 +67,7 @@ def page(root: Behaviour, *, direction: str | None = None, depth: int | None = N
     return _PLACEHOLDER.sub(lambda found: parts[found[1]], _file("page.html"))
 
 
-def open_depth(nodes: Sequence[Row], most: int) -> int:
+def open_depth(nodes: Sequence[NodeRow], most: int) -> int:
     """Return the deepest level down to which there are at most `most` nodes; 1 at least."""
     levels = Counter(row.depth for row in nodes)
     shown, depth = 1, 0
@@ -77,7 +77,7 @@ def open_depth(nodes: Sequence[Row], most: int) -> int:
     return max(depth, 1)
 
 
-def _data(nodes: Sequence[Row], direction: str | None, depth: int | None) -> dict[str, object]:
+def _data(nodes: Sequence[NodeRow], direction: str | None, depth: int | None) -> dict[str, object]:
     """Return what the script draws. Nodes of one action share their tables, by number."""
     shared: dict[Table, int] = {}
     types: dict[object, list[Table]] = {}

@@ -18,8 +18,7 @@ from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from bt_actions.ros.naming import overrides, own_node
-from bt_actions.ros.workarounds import participant
+from bt_actions.ros.naming import overrides, passing_node
 
 PARAMETER = ("-p", "--param")
 FILE = "--params-file"
@@ -49,7 +48,8 @@ def given_by(words: Sequence[str], name: str, namespace: str = "") -> Given:
 
     Raises ValueError, with a remedy, for words that rcl does not understand.
     """
-    with _understood(), _asking(words, name, namespace) as node:
+    asks = {"args": ["--ros-args", *words], "parameter_overrides": _SETTLED}
+    with _understood(), passing_node(name, namespace=namespace, **asks) as node:
         found = _without_common(overrides(node))
         mine = set[str]()
         written, unused = dict[str, str](), list[tuple[str, str]]()
@@ -73,20 +73,6 @@ def given_by(words: Sequence[str], name: str, namespace: str = "") -> Given:
             frozenset(found.keys() - mine),
             unused,
         )
-
-
-@contextlib.contextmanager
-def _asking(words: Sequence[str], name: str, namespace: str) -> Iterator[Node]:
-    node = own_node(
-        name,
-        args=["--ros-args", *words],
-        namespace=namespace,
-        parameter_overrides=_SETTLED,
-    )
-    try:
-        yield node
-    finally:
-        participant.close(node)
 
 
 def _sources(words: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -97,7 +97,7 @@ class _Topic:
         return ""
 
 
-class Subscription(_Topic):
+class RosSubscription(_Topic):
     """That of a leaf; the Subscription of traffic/backend.py."""
 
     listens = True
@@ -134,7 +134,7 @@ class Subscription(_Topic):
         self._node.destroy_subscription(self._subscription)
 
 
-class Publisher(_Topic):
+class RosPublisher(_Topic):
     """That of a leaf; the Publisher of traffic/backend.py."""
 
     listens = False
@@ -170,7 +170,7 @@ class Publisher(_Topic):
         self._node.destroy_publisher(self._publisher)
 
 
-class Service:
+class RosService:
     """A client of a leaf; the Service of traffic/backend.py."""
 
     def __init__(self, node: Node, service_type: type, name: str) -> None:

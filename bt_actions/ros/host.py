@@ -9,11 +9,11 @@ from __future__ import annotations
 import threading
 import time
 
-from bt_actions.goals.ids import new_goal_id
 from bt_actions.ros.log import log
-from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.scheduler import Scheduler
+from bt_actions.traffic.stalls import Stalls
 from bt_actions.traffic.state import Domain, Record, Trace
+from bt_actions.utilities.ids import new_id
 from bt_actions.utilities.plain_text import raised
 
 LINGER = 5.0
@@ -25,7 +25,7 @@ class RosHost:
     """What the goals of this process have in common."""
 
     def __init__(self) -> None:
-        self.steady, self.new_goal_id = time.monotonic, new_goal_id
+        self.steady, self.new_goal_id = time.monotonic, new_id
         self.lock = threading.RLock()
         """Taken before a lock of rclpy's, or of a transport's, never after."""
         changed = threading.Condition(self.lock)

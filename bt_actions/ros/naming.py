@@ -6,12 +6,13 @@ is opened before its node is needed, and what it has seen by then counts; nobody
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 import re
 import sys
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from rclpy.context import Context
@@ -79,6 +80,16 @@ def own_node(
         raise
 
 
+@contextlib.contextmanager
+def passing_node(name: str, **given: Any) -> Iterator[Node]:
+    """Have a node as `own_node` makes it, which is gone afterwards."""
+    node = own_node(name, **given)
+    try:
+        yield node
+    finally:
+        participant.close(node)
+
+
 def server_name(node: Node, action: str) -> str:
     """Return the full name of the server that a node's goals for an action go to.
 
@@ -95,11 +106,8 @@ def server_names(actions: Iterable[str], name: str, namespace: str = "") -> list
 
     `name` and `namespace` are that node's, before remapping. Raises what rclpy raises.
     """
-    node = own_node(name, namespace=namespace)
-    try:
+    with passing_node(name, namespace=namespace) as node:
         return sorted({server_name(node, each) for each in actions})
-    finally:
-        participant.close(node)
 
 
 def warn_of_remapping(node: Node, action: str) -> None:

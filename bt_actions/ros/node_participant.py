@@ -19,7 +19,7 @@ from bt_actions.goals.terms import NEVER
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.clocks import Clocks
-from bt_actions.ros.connections import Publisher, Service, Subscription
+from bt_actions.ros.connections import RosPublisher, RosService, RosSubscription
 from bt_actions.ros.environment import of_other_users, sees_nobody_else
 from bt_actions.ros.exit import close_process, disown
 from bt_actions.ros.graph import enclave, is_shut_down, is_valid
@@ -76,9 +76,9 @@ class NodeParticipant:
             sight = _sights[node.context] = _Sight(sight)
         sight.nodes.add(node)
         self.seen_since, self.long_stalls = sight.since, sight.long_stalls
-        self.service = functools.partial(Service, node)
-        self.subscription = functools.partial(Subscription, node, sight.since)
-        self.publisher = functools.partial(Publisher, node, sight.since)
+        self.service = functools.partial(RosService, node)
+        self.subscription = functools.partial(RosSubscription, node, sight.since)
+        self.publisher = functools.partial(RosPublisher, node, sight.since)
         self.traffic = Traffic(host, self)
         self._receiver = Receiver(node)
         self._servers: dict[str, str] = {}

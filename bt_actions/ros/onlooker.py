@@ -17,8 +17,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.ros.graph import servers
-from bt_actions.ros.naming import own_node
-from bt_actions.ros.workarounds import participant
+from bt_actions.ros.naming import passing_node
 
 NODE = "bt_actions_cleanup"
 STATUS = "/_action/status"
@@ -102,11 +101,9 @@ class Onlooker:
 @contextlib.contextmanager
 def onlooker() -> Iterator[Onlooker]:
     """Look from a node in a context of its own, whose names nothing remaps. Raises CannotStart."""
-    try:
-        node = own_node(NODE, use_global_arguments=False)
-    except (RuntimeError, OSError) as error:
-        raise CannotStart(str(error).splitlines()[0]) from error
-    try:
+    with contextlib.ExitStack() as stack:
+        try:
+            node = stack.enter_context(passing_node(NODE, use_global_arguments=False))
+        except (RuntimeError, OSError) as error:
+            raise CannotStart(str(error).splitlines()[0]) from error
         yield Onlooker(node)
-    finally:
-        participant.close(node)

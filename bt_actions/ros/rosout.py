@@ -1,28 +1,32 @@
-"""What is said of runs on `/rosout`, in the name of their node; nothing of it is printed.
+"""Lines about runs on `/rosout`, in the name of their node; those of served runs are also logged.
 
-rclpy's own loggers would print it as well, and hold up the process where nobody reads (log.py).
+rclpy's own loggers would print it all, and hold up the process where nobody reads (log.py).
 """
 
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable
 from typing import Literal
 
 from rcl_interfaces.msg import Log
 from rclpy.node import Node
 
+from bt_actions.ros.log import log
 from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.plain_text import clean_lines
 
 Level = Literal["info", "warn", "error"]
+Tell = Callable[[Level, str], None]
+"""Says something; an error needs attention."""
 
 
 class Rosout:
     """Publishes on `/rosout` for one node, on any thread; to be closed before the node is gone."""
 
     def __init__(self, node: Node) -> None:
-        self._node = node
+        self._node, self._name = node, node.get_fully_qualified_name()
         publisher = NodeParticipant.of(node).publisher(Log, "/rosout", "rosout")
         self._publish, self.close = publisher.publish, publisher.close
 
@@ -31,3 +35,9 @@ class Rosout:
         with contextlib.suppress(Exception):  # its node is gone, say: the log has it as well
             stamp, name = self._node.get_clock().now().to_msg(), self._node.get_logger().name
             self._publish(Log(stamp=stamp, level=LEVELS[level], name=name, msg=clean_lines(text)))
+
+    def tell(self, level: Level, text: str) -> None:
+        """Say it, and write it to the log with the node's full name."""
+        put = {"info": log.info, "warn": log.warning, "error": log.error}[level]
+        put(f"{self._name}: {text}")
+        self.say(level, text)

@@ -20,6 +20,7 @@ from py_trees.common import Duration, Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.places import culprit_of, path_of, root_of
 from bt_actions.events import Event, Observer, Paused
 from bt_actions.events.stream import Reader
 from bt_actions.messages.interfaces import TwoTypes
@@ -28,7 +29,6 @@ from bt_actions.running.telling import TreeError, TreeTeller, UnusableTree
 from bt_actions.running.ticking import QUIET_REST, ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
 from bt_actions.traffic.drain import Drain, drain
-from bt_actions.utilities.places import culprit_of, path_of, root_of
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done, Sleep
 from bt_actions.wiring import backend_of

@@ -20,13 +20,13 @@ from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions import wiring
+from bt_actions.behaviours.places import path_of, root_of
 from bt_actions.events import Observer
 from bt_actions.events.stream import Stream
 from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.running.loop import TickLoop, check_seconds
 from bt_actions.running.telling import TreeError
 from bt_actions.running.threads import StartedRun, WakeUp
-from bt_actions.utilities.places import path_of, root_of
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done
 from bt_actions.utilities.suggest import listing

@@ -12,9 +12,9 @@ import threading
 
 from py_trees.behaviour import Behaviour
 
+from bt_actions.behaviours.places import path_of
 from bt_actions.running.goals import RunGoals
 from bt_actions.traffic.traffic import Traffic
-from bt_actions.utilities.places import path_of
 
 GRACE = 1.0
 """Seconds for a tick to return when the tree is to end."""

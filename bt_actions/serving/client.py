@@ -5,13 +5,11 @@ All of it blocks for some seconds.
 
 from __future__ import annotations
 
-import contextlib
-
 from bt_actions_interfaces.msg import Rejection, TreeInfo
 from bt_actions_interfaces.srv import ControlTree, ListTrees
 from unique_identifier_msgs.msg import UUID
 
-from bt_actions.ros.serving.questions import Asker, answers, heard
+from bt_actions.ros.serving.questions import asking
 from bt_actions.serving.control import COMMANDS
 from bt_actions.serving.rejections import REJECTIONS
 from bt_actions.utilities.plain_text import clean
@@ -31,7 +29,7 @@ def control(action: str, command: str, beginning: str) -> str:
 
     `action` is its full name; without a beginning, the one run there is. Raises NotControlled.
     """
-    with Asker() as asker:
+    with asking() as asker:
         place, _, own = action.rpartition("/")
         found = own == "run_tree" and asker.find(
             ListTrees, lambda name: name.rsplit("/", 2)[0] == place
@@ -81,13 +79,15 @@ def _chosen(action: str, runs: dict[str, str], beginning: str) -> str:
 
 def why_rejected(goal_name: str) -> Rejection | None:
     """Return the first rejection of a goal of this name that any server in sight tells of."""
-    with contextlib.closing(heard(Rejection, REJECTIONS)) as rejections:
+    with asking() as asker:
+        rejections = asker.heard(Rejection, REJECTIONS)
         return next((each for each in rejections if each.goal_name == goal_name), None)
 
 
 def trees_in_sight(namespace: str = "") -> dict[str, list[TreeInfo] | None]:
     """Return the trees of the servers below a namespace, by node; None: no answer."""
-    return {
-        service.removesuffix("/list_trees"): None if told is None else list(told.trees)
-        for service, told in answers(ListTrees, namespace).items()
-    }
+    with asking() as asker:
+        return {
+            service.removesuffix("/list_trees"): None if told is None else list(told.trees)
+            for service, told in asker.answers(ListTrees, namespace).items()
+        }

@@ -5,8 +5,8 @@ from __future__ import annotations
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import Rejection
 
+from bt_actions.ros.rosout import Tell
 from bt_actions.ros.serving.endpoints import Endpoints, kept
-from bt_actions.ros.serving.telling import Telling
 from bt_actions.serving.requests import Refused
 from bt_actions.utilities.plain_text import clean
 
@@ -18,7 +18,7 @@ ECHO = 200
 class Rejections:
     """The log, and the topic ``~/rejections``, which keeps the last ten."""
 
-    def __init__(self, endpoints: Endpoints, say: Telling) -> None:
+    def __init__(self, endpoints: Endpoints, say: Tell) -> None:
         self._say = say
         self._node = endpoints.node
         self._publisher = endpoints.publisher(Rejection, "~/rejections", kept(REJECTIONS))

@@ -20,12 +20,11 @@ from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
 
 from bt_actions.document import Tree
 from bt_actions.document.reading.find import tree_folder
-from bt_actions.ros.rosout import Level
+from bt_actions.ros.rosout import Level, Rosout
 from bt_actions.ros.serving.action_server import DeferredActionServer
 from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.ros.serving.lifecycle import Lifecycle
 from bt_actions.ros.serving.precedence import Precedence
-from bt_actions.ros.serving.telling import Telling
 from bt_actions.serving.catalog import Catalog
 from bt_actions.serving.control import Control
 from bt_actions.serving.diagnostics import Diagnostics, Standing
@@ -103,7 +102,6 @@ class TreeServer:
         self.stuck: list[str] = []
         """A line for each run that was left, as it did not end after `abandon`."""
         self._abandoned = threading.Event()
-        self._is_drained = False
         self._turns: Turns[Goal] = Turns(Policy(policy), most)
         self._goals: dict[bytes, Goal] = {}
         self._canceled_early: set[bytes] = set()
@@ -112,7 +110,8 @@ class TreeServer:
         self._underway = Underway(node.context.get_domain_id())
         self._worker = ThreadPoolExecutor(1, "bt_actions-check")
         self._endpoints = endpoints = Endpoints(node)
-        self._say = Telling(node)
+        self._rosout = Rosout(node)
+        self._say = self._rosout.tell
         self._rejections = Rejections(endpoints, self._say)
         self.precedence = Precedence(endpoints, "run_tree", self._say)
         self._action = DeferredActionServer(
@@ -151,11 +150,11 @@ class TreeServer:
             self._configure()
             self._activate()
 
-    def drain(self) -> None:
-        """Accept nothing more for good, end all runs, and answer their goals.
+    def close(self) -> None:
+        """Accept nothing more, end all runs, answer their goals, and be gone.
 
         Returns when every goal has ended, or its `timeout.cancel` has passed; not on a thread of
-        the node's executor, which is to be spun.
+        the node's executor.
         """
         if self.lifecycle is not None:
             self.lifecycle.stop()
@@ -163,16 +162,7 @@ class TreeServer:
         with contextlib.suppress(RuntimeError):  # of an interpreter that ends
             wait([self._worker.submit(int)], _LAST_WORDS)  # until what is awaited from it is there
         time.sleep(_LINGER)
-        self._is_drained = True
-
-    def close(self) -> None:
-        """Drain, where that has not been done, and be gone.
-
-        Best drain, stop the executor, then close: rclpy's executors fail over what is gone.
-        """
-        if not self._is_drained:
-            self.drain()
-        self._say.close()
+        self._rosout.close()
         self._endpoints.close()
         self._action.destroy()
         if self.lifecycle is not None:
@@ -359,6 +349,8 @@ class TreeServer:
         self._last[goal.tree] = outcome
         if outcome.settled:
             self._underway.ends(goal.id)
+        with self._lock:  # its client may send the next goal as soon as it is answered
+            begun = self._turns.leave(goal)
         try:
             self._answer(goal, outcome)
         except Exception as error:  # noqa: BLE001 - the context was shut down before; by version
@@ -367,7 +359,6 @@ class TreeServer:
             self.unaccounted += outcome.unaccounted
             self._goals.pop(goal.id, None)
             self._answered.notify_all()
-            begun = self._turns.leave(goal)
         self._begin(begun)
 
     def _tell_of(self, goal: Goal, text: str, level: Level = "info") -> None:

@@ -13,9 +13,9 @@ import threading
 from collections.abc import Collection, Iterable
 from pathlib import Path
 
-from bt_actions.goals.ids import author_of, new_goal_id
 from bt_actions.recovery.ledger import directory
 from bt_actions.ros.log import log
+from bt_actions.utilities.ids import author_of, new_id
 from bt_actions.utilities.whole_file import replace_file
 
 _SUFFIX = ".underway"
@@ -32,7 +32,7 @@ class Underway:
         self._lock = threading.Lock()
         self._runs: dict[object, Collection[str]] = {}
         self._path: Path | None = None
-        self._name = f"{new_goal_id()[:_PREFIX].hex()}-{next(_number)}{_SUFFIX}"
+        self._name = f"{new_id()[:_PREFIX].hex()}-{next(_number)}{_SUFFIX}"
 
     def begins(self, run: object, actions: Collection[str]) -> None:
         """Put on record that a run is about to use these actions, by their full names."""

@@ -25,7 +25,7 @@ class Request(Protocol):
         """The goal message, of a request for a goal."""
 
 
-class Server(Protocol):
+class RequestHandler(Protocol):
     """What an action server decides; none of it raises."""
 
     def on_request(self, request: Request) -> bool:
@@ -92,7 +92,7 @@ class Timer(Protocol):
         """Ring no more."""
 
 
-class Log(Protocol):
+class SimulationLog(Protocol):
     """Where servers say what goes wrong."""
 
     def info(self, text: str) -> None:
@@ -109,7 +109,7 @@ class Platform(Protocol):
     """What simulated servers stand on."""
 
     @property
-    def log(self) -> Log:
+    def log(self) -> SimulationLog:
         """Its log."""
 
     def now(self) -> float:
@@ -121,7 +121,9 @@ class Platform(Protocol):
     def expand(self, name: str) -> str:
         """Return the full name of a topic or an action."""
 
-    def serve(self, action_type: Any, name: str, server: Server, result_timeout: float) -> Wire:
+    def serve(
+        self, action_type: Any, name: str, server: RequestHandler, result_timeout: float
+    ) -> Wire:
         """Serve an action; a goal that has ended is forgotten after `result_timeout` seconds."""
 
     def publisher(self, message_type: Any, topic: str) -> Publisher:

@@ -35,7 +35,7 @@ from bt_actions.events.snapshot import Value
 from bt_actions.goals.policy import End
 from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.story.actions import ActionStory, GoalStory
-from bt_actions.utilities.places import told_apart
+from bt_actions.utilities.names import told_apart
 
 OVER = (Status.SUCCESS, Status.FAILURE)
 KEPT = 100

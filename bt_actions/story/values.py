@@ -6,17 +6,10 @@ from collections.abc import Mapping
 
 from bt_actions.events.snapshot import Cut, Value
 from bt_actions.story.actions import ActionStory
-from bt_actions.utilities.shorten import fit, shorten
+from bt_actions.utilities.shorten import fit
 
 Constants = Mapping[str, Value]
 """By field the names of numbers."""
-LONG = 200
-"""Characters of a value; longer ones are cut."""
-
-
-def brief(value: object) -> str:
-    """Return a value as people read it, short however large it is; a text without quotes."""
-    return fit(value, LONG) if isinstance(value, str) else shorten(value, LONG)
 
 
 def feedback_text(action: ActionStory) -> str:

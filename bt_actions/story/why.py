@@ -13,10 +13,10 @@ from bt_actions.events.kinds import Node, RoundBegan
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory, GoalStory
 from bt_actions.story.state import Failure, NodeStory, State
-from bt_actions.story.values import brief, feedback_text, opened
+from bt_actions.story.values import feedback_text, opened
 from bt_actions.story.waiting import due_of
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import fit, shorten
+from bt_actions.utilities.shorten import brief, fit, shorten
 
 LINES = 12
 """Of one story in a terminal."""

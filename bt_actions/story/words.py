@@ -13,10 +13,10 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import NodeStory, State
 from bt_actions.story.table import table
-from bt_actions.story.values import brief, constants_of, feedback_text, named
+from bt_actions.story.values import constants_of, feedback_text, named
 from bt_actions.story.why import why
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import MESSAGE, fit
+from bt_actions.utilities.shorten import MESSAGE, brief, fit
 from bt_actions.utilities.suggest import listing
 
 _USUAL_ENDS = {

@@ -18,7 +18,7 @@ from bt_actions.goals.terms import (
     STATUS_SUCCEEDED,
 )
 from bt_actions.messages.interfaces import short_name
-from bt_actions.simulation.platform import Request, Server
+from bt_actions.simulation.platform import Request, RequestHandler
 from bt_actions.testing.medium import Medium, VirtualRequest
 
 ACCEPTED, CANCELING = 1, 3
@@ -41,7 +41,7 @@ class VirtualActionServer:
         medium: Medium,
         name: str,
         action_type: Any,
-        server: Server,
+        server: RequestHandler,
         result_timeout: float,
     ) -> None:
         self.gid = medium.new_gid()

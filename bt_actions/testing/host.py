@@ -9,10 +9,10 @@ from __future__ import annotations
 import random
 from contextlib import nullcontext
 
-from bt_actions.servers.stalls import Stalls
 from bt_actions.testing.network import Lines
 from bt_actions.testing.timeline import Alarm, Timeline
 from bt_actions.traffic.scheduler import Scheduled, Scheduler
+from bt_actions.traffic.stalls import Stalls
 from bt_actions.traffic.state import Domain, Record, Trace
 
 

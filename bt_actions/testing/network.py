@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from bt_actions.messages.interfaces import interface, interface_name, short_name
-from bt_actions.simulation.platform import Server
+from bt_actions.simulation.platform import RequestHandler
 from bt_actions.testing.action_server import VirtualActionServer
 from bt_actions.testing.medium import Medium
 from bt_actions.testing.timeline import Alarm, Timeline
@@ -78,7 +78,7 @@ class VirtualNetwork(Medium):
         return name if name.startswith("/") else f"{self.namespace.rstrip('/')}/{name}"
 
     def serve(
-        self, action_type: Any, name: str, server: Server, result_timeout: float
+        self, action_type: Any, name: str, server: RequestHandler, result_timeout: float
     ) -> VirtualActionServer:
         return VirtualActionServer(self, self.expand(name), action_type, server, result_timeout)
 

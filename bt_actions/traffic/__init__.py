@@ -18,8 +18,9 @@ A goal goes out, and a reply comes back, through these functions, in this order:
     answer_came       Replies.weigh_answer, driver.tell_believed, driver.tell: Goal.on, and what
                       follows from that in driver._do_in_order; when the goal is DONE, driver.retire
 
-From below to above, each file imports those before it alone: transport.py, scheduler.py, state.py,
-cancel_queue.py, route.py (sees, asks and hears a server), admission.py (may a goal be sent?),
-driver.py (tells goals, and does what they decide), handover.py (goals go to another endpoint),
-watcher.py (looks at a server), endpoint.py, drain.py, traffic.py, and, for other rooms, backend.py.
+From below to above, each file imports those before it alone: transport.py, stalls.py (this process
+stood still), scheduler.py, state.py, cancel_queue.py, route.py (sees, asks and hears a server),
+admission.py (may a goal be sent?), driver.py (tells goals, and does what they decide), handover.py
+(goals go to another endpoint), watcher.py (looks at a server), endpoint.py, drain.py, traffic.py,
+and, for other rooms, backend.py.
 """

@@ -12,13 +12,13 @@ from typing import Any
 
 from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.goal import Goal
-from bt_actions.goals.ids import author_of
 from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_REJECTED, STATUS_SUCCEEDED, Event
 from bt_actions.servers.replies import DENIALS
 from bt_actions.traffic import cancel_queue, route, watcher
 from bt_actions.traffic.driver import apply_deadlines, close_if_unused, take_in, tell, tell_believed
 from bt_actions.traffic.state import Ended, Endpoint, GoalHandle, Log, wake
 from bt_actions.traffic.transport import Request
+from bt_actions.utilities.ids import author_of
 
 DELIVER_EVERY = 0.01
 """Seconds between two takes of answers, where nobody spins."""

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from typing import Protocol
 
-from bt_actions.servers.stalls import Stalls
+from bt_actions.traffic.stalls import Stalls
 
 AT_LEAST_EVERY = 0.2
 """Seconds; a clock that is not the steady one may run faster than anybody can know."""

@@ -23,8 +23,8 @@ from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import NEVER, Command, Event, Now, State
 from bt_actions.servers.presence import GID, PROBES_KEPT, Server, ServerWatch
 from bt_actions.servers.replies import Replies
-from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic.scheduler import Scheduled, Scheduler
+from bt_actions.traffic.stalls import Stalls
 from bt_actions.traffic.transport import ActionTransport, Listener
 from bt_actions.utilities.plain_text import raised
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import LEASE, Server
-from bt_actions.servers.stalls import ANSWERS_TAKE
 from bt_actions.traffic import handover, route
 from bt_actions.traffic.admission import BESIDE
 from bt_actions.traffic.driver import tell, tell_believed
 from bt_actions.traffic.route import LOOK_WHILE_RUNNING
+from bt_actions.traffic.stalls import ANSWERS_TAKE
 from bt_actions.traffic.state import Endpoint, wake
 from bt_actions.traffic.transport import ActionTransport
 

@@ -12,6 +12,8 @@ from bt_actions.utilities.plain_data import field_of, item_of, scalar
 
 MESSAGE = 300
 """Characters of a message: three lines of a terminal."""
+LONG = 200
+"""Characters of a value; longer ones are cut."""
 
 _ALL = 20
 """A list with more items is shown by its first ones and their number."""
@@ -19,6 +21,11 @@ _FIRST = 3
 _NOTHING = object()
 Part = tuple[str, object]
 """A text, and a value that stands behind it (or `_NOTHING`)."""
+
+
+def brief(value: object) -> str:
+    """Return a value as people read it, short however large it is; a text without quotes."""
+    return fit(value, LONG) if isinstance(value, str) else shorten(value, LONG)
 
 
 def shorten(value: object, limit: int = MESSAGE) -> str:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from bt_actions import TreeRunner, load_tree
 from bt_actions.cli.arguments.ros_arguments import as_inputs, parameters
 from bt_actions.document import tree_inputs
+from bt_actions.running.shown import ShownRun
 from tests.cli.conftest import Start
 from tests.support.parameter_dump import dumped
 from tests.support.processes import Host
@@ -125,6 +128,23 @@ def test_a_failure_is_told_on_rosout_with_its_reason_and_is_printed_once(
     assert ends[0] == 40
     assert ends[1].startswith("one_move ends: FAILURE after ")
     assert not any("begins" in line or "ends:" in line for line in [*run.lines, *run.errors])
+
+
+def test_a_program_of_the_users_shows_its_runs_so_too(watcher: Watcher, tmp_path: Path) -> None:
+    path = tmp_path / "quick.yaml"
+    path.write_text("tree: quick\ninputs: {speed: {type: float64, default: 0.2}}\n"
+                    "root: {check: $speed < 1.0}\n")  # fmt: skip
+    root = load_tree(path)
+    with TreeRunner(root, name="of_a_program") as runner:
+        shown = ShownRun(runner, root)
+        runner.on_close(shown.close)
+        assert runner.node.get_parameter("speed").value == 0.2
+        runner.run()
+        (begins,) = watcher.hears("of_a_program", "begins")
+        threading.Thread(target=runner.shutdown).start()
+        ends = watcher.hears("of_a_program", "ends")[-1]
+    assert begins == (20, f"quick ({path}) begins with speed=0.2")
+    assert ends[1].startswith("quick ends: SUCCESS after ")
 
 
 def test_a_run_that_is_ended_by_a_signal_says_so_last_of_all(

@@ -18,12 +18,12 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import Command, Event, Now, State
 from bt_actions.servers.reachability import Reachability
-from bt_actions.servers.stalls import IN_A_ROW, Stalls
 from bt_actions.traffic import state as traffic
 from bt_actions.traffic import watcher
 from bt_actions.traffic.driver import apply_deadlines, tell
 from bt_actions.traffic.endpoint import ActionEndpoint
 from bt_actions.traffic.scheduler import Scheduler
+from bt_actions.traffic.stalls import IN_A_ROW, Stalls
 from bt_actions.traffic.state import Domain, Record, Trace
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.traffic.transport import GOALS_KEPT, Listener

@@ -22,8 +22,8 @@ from bt_actions.goals.steps import canceling, requested, running
 from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import MAY_STILL_BE_ACCEPTED, Command, Event, State
 from bt_actions.servers import replies
-from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic import admission, driver, endpoint, handover
+from bt_actions.traffic.stalls import Stalls
 from bt_actions.traffic.state import GoalHandle
 from tests.machine.crowds import CrowdPlay, crowded_history
 from tests.machine.histories import broken, first_broken, random_history, shrink, tell

@@ -10,8 +10,8 @@ import pytest
 
 from bt_actions.ros import host as module
 from bt_actions.ros.host import RosHost
-from bt_actions.servers.stalls import STOOD_STILL
 from bt_actions.traffic.scheduler import AT_LEAST_EVERY
+from bt_actions.traffic.stalls import STOOD_STILL
 from tests.support.waiting import until
 
 

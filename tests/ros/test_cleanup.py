@@ -25,10 +25,10 @@ SEND = (
     "from rclpy.action import ActionClient;"
     "from robot_control_interfaces.action import MoveRobot;"
     "from unique_identifier_msgs.msg import UUID;"
-    "from bt_actions.goals.ids import new_goal_id;"
+    "from bt_actions.utilities.ids import new_id;"
     "rclpy.init(); node = rclpy.create_node('sender');"
     "client = ActionClient(node, MoveRobot, sys.argv[1]); client.wait_for_server();"
-    "goal_id = UUID(uuid=list(new_goal_id()));"
+    "goal_id = UUID(uuid=list(new_id()));"
     "client.send_goal_async(MoveRobot.Goal(distance=90.0), goal_uuid=goal_id);"
     "rclpy.spin(node)"
 )

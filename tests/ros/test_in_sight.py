@@ -12,7 +12,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo as Ends
 from robot_control_interfaces.action import MoveRobot
 from std_srvs.srv import SetBool
 
-from bt_actions.ros.connections import Service, qos_profile
+from bt_actions.ros.connections import RosService, qos_profile
 from bt_actions.ros.in_sight import mismatch
 from bt_actions.ros.node_participant import NodeParticipant
 from bt_actions.utilities.suggest import elsewhere
@@ -121,7 +121,7 @@ def test_of_a_service_in_sight_the_policy_that_does_not_match_is_named(
 ) -> None:
     theirs = Node("theirs", context=node.context)
     theirs.create_service(SetBool, name, lambda _, answer: answer, qos_profile=LESS["best effort"])
-    service = Service(node, SetBool, name)
+    service = RosService(node, SetBool, name)
     said = f"{IN_SIGHT}it is best effort, and reliable is asked for"
     until(lambda: service.why_nobody() == said)
     service.close()

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.goals.ids import Author, new_goal_id
 from bt_actions.traffic.endpoint import warn_of_dead
+from bt_actions.utilities.ids import Author, new_id
 
 
 def of_the_dead() -> bytes:
     """An id that this process would have made, had it begun at another moment."""
-    made = bytearray(new_goal_id())
+    made = bytearray(new_id())
     made[10] ^= 0xFF
     return bytes(made)
 
@@ -41,14 +41,14 @@ def test_a_goal_of_the_dead_is_named_once_though_statuses_of_two_servers_take_tu
 def test_goals_of_the_living_and_of_other_clients_are_nobodys_concern(said: Said) -> None:
     elsewhere = bytearray(of_the_dead())
     elsewhere[3] ^= 0xFF
-    warn_of_dead("/move", {new_goal_id(), bytes(16), b"", bytes(elsewhere)}, set(), said)
+    warn_of_dead("/move", {new_id(), bytes(16), b"", bytes(elsewhere)}, set(), said)
     assert not said
 
 
 def test_who_dies_later_is_found_at_the_next_status(
     said: Said, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told, goal = set[bytes](), new_goal_id()
+    told, goal = set[bytes](), new_id()
     warn_of_dead("/move", {goal}, told, said)
     assert not said
     monkeypatch.setattr(Author, "alive", False)

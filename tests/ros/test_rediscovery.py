@@ -17,8 +17,8 @@ from bt_actions.ros import node_participant, rediscovery
 from bt_actions.ros.graph import enclave
 from bt_actions.ros.host import host as process
 from bt_actions.ros.rediscovery import SecondParticipant
-from bt_actions.servers.stalls import Stalls
 from bt_actions.traffic import route
+from bt_actions.traffic.stalls import Stalls
 from tests.support.trees import in_turn, started
 from tests.support.waiting import until
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from bt_actions.goals.ids import Author
 from bt_actions.goals.policy import End
 from bt_actions.recovery import sweep as module
 from bt_actions.recovery.ledger import Sent
 from bt_actions.recovery.roll_call import LeftBehind, RollCall
 from bt_actions.recovery.sweep import Cleanup, Swept
 from bt_actions.ros.onlooker import CannotStart
+from bt_actions.utilities.ids import Author
 from tests.support.processes import Journal, Process
 
 SEND = """
@@ -23,7 +23,7 @@ import sys, rclpy
 from rclpy.action import ActionClient
 from robot_control_interfaces.action import MoveRobot
 from unique_identifier_msgs.msg import UUID
-from bt_actions.goals.ids import new_goal_id
+from bt_actions.utilities.ids import new_id
 from bt_actions.recovery.ledger import Ledger
 from bt_actions.ros.graph import servers
 from bt_actions.traffic.state import Entry
@@ -31,7 +31,7 @@ action, domain, distance, known, lost = sys.argv[1:]
 domain, distance, lost = int(domain), float(distance), lost == "1"
 known = [known.encode()] if known else []
 rclpy.init()
-node, goal_id = rclpy.create_node("sender"), new_goal_id()
+node, goal_id = rclpy.create_node("sender"), new_id()
 client = ActionClient(node, MoveRobot, action)
 if distance:
     client.wait_for_server()

@@ -18,9 +18,9 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.action import ActionServer
 from rclpy.node import Node
 
-from bt_actions.goals.ids import new_goal_id
 from bt_actions.ros.graph import servers
 from bt_actions.serving import TreeServer
+from bt_actions.utilities.ids import new_id
 from tests.serving.conftest import MAIN, Serve
 from tests.support.processes import Process
 from tests.support.tree_client import TreeClient
@@ -119,14 +119,14 @@ def test_a_server_that_is_none_of_trees_comes_first(
 
 
 AUTHORS = {
-    "this process": new_goal_id,
+    "this process": new_id,
     "a dead one": lambda: bytes.fromhex(subprocess.check_output(MAKE_ID, text=True)),
-    "another machine's": lambda: new_goal_id()[:3] + b"???" + new_goal_id()[6:],
+    "another machine's": lambda: new_id()[:3] + b"???" + new_id()[6:],
 }
 MAKE_ID = [
     sys.executable,
     "-c",
-    "from bt_actions.goals.ids import new_goal_id; print(new_goal_id().hex())",
+    "from bt_actions.utilities.ids import new_id; print(new_id().hex())",
 ]
 
 

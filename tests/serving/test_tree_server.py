@@ -7,6 +7,7 @@ import json
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest.mock import AsyncMock
 
@@ -18,6 +19,7 @@ from bt_actions_interfaces.srv import CheckTree, ListTrees
 from rclpy.action.server import RCLError
 
 from bt_actions.serving import TreeServer
+from bt_actions.serving.outcome import Code, RunOutcome
 from tests.serving.conftest import MOVE, Serve
 from tests.support.processes import Journal, Process
 from tests.support.tree_client import PATIENCE, TreeClient
@@ -254,6 +256,19 @@ def test_a_cancel_is_forgotten_with_a_goal_whose_client_vanished(
     server.close()
 
 
+def test_who_has_a_result_may_send_the_next_goal_at_once(
+    node: Any, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server, refusals = TreeServer(node, trees=folder), list[str]()
+    goal: Any = SimpleNamespace(id=bytes(16), tree="empty", label="it", begun_at=None)
+    server._turns.running.append(goal)
+    assert server._turns.refusal()
+    monkeypatch.setattr(server, "_answer", lambda *_: refusals.append(server._turns.refusal()))
+    server._ended(goal, RunOutcome(int(Code.NONE), ""))
+    assert refusals == [""]
+    server.close()
+
+
 OWN_NODE = """
 import sys, rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -290,3 +305,41 @@ def test_where_the_context_is_shut_down_first_all_goals_are_drained_and_nobody_c
     assert journal.ends() == ["canceled"]
     assert any("its client could not be answered" in line for line in server.errors)
     assert "Traceback" not in "\n".join(server.errors)
+
+
+CLOSED_WHILE_SPUN = """
+import sys, threading, rclpy
+from bt_actions_interfaces.srv import ListTrees
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from bt_actions.serving import TreeServer
+rclpy.init()
+node = rclpy.create_node("bt_actions_serve", namespace=sys.argv[2])
+spun, asking = MultiThreadedExecutor(2), SingleThreadedExecutor()
+spun.add_node(node)
+spinning = threading.Thread(target=spun.spin)
+spinning.start()
+asker = rclpy.create_node("asker", namespace=sys.argv[2])
+asking.add_node(asker)
+client = asker.create_client(ListTrees, "bt_actions_serve/list_trees")
+is_over = threading.Event()
+
+def ask():
+    while not is_over.is_set():
+        if client.service_is_ready():
+            client.call_async(ListTrees.Request())
+        asking.spin_once(0.001)
+
+threading.Thread(target=ask).start()
+for _ in range(10):
+    TreeServer(node, trees=sys.argv[1]).close()
+print(spinning.is_alive(), flush=True)
+is_over.set()
+rclpy.shutdown()
+"""
+
+
+def test_a_server_is_closed_while_its_node_is_spun_and_it_is_asked(
+    start_program: Callable[..., Process], folder: Path, space: str
+) -> None:
+    program = start_program("-c", CLOSED_WHILE_SPUN, str(folder), space)
+    assert program.line(within=60.0) == "True", program

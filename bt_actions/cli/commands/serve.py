@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import argparse
 import os
-import threading
-import time
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.arguments.options import MOST, add_option, count
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters, taken
 from bt_actions.cli.driving.serving import say, serve
-from bt_actions.cli.driving.signals import SAME_WISH
 from bt_actions.cli.driving.sweep import sweep
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, leave, refuse_domain
 from bt_actions.cli.streams.writing import note
@@ -97,29 +94,16 @@ def run(args: argparse.Namespace) -> int:
         "serve",
         lambda node: _server(node, options),
         announce=lambda server: _announce(server, managed=options["managed"]),
-        drain=_drain,
+        close=_close,
         conclude=_conclude,
         name=NAME,
         namespace=args.namespace,
     )
 
 
-def _drain(server: TreeServer, signals: Signals) -> None:
-    """Drain all; one more signal ends the wait, and a run that does not end then is left."""
-    not_before = time.monotonic() + SAME_WISH
-    drained = threading.Event()
-
-    def drain() -> None:
-        try:
-            server.drain()
-        finally:
-            drained.set()
-            signals.poke()
-
-    threading.Thread(target=drain, name="bt_actions-drain").start()
-    while not drained.is_set():
-        if signals.wait(None)[0] and time.monotonic() > not_before:
-            server.abandon()
+def _close(server: TreeServer, signals: Signals) -> None:
+    """Close the server; one more signal ends the wait, and a run that does not end then is left."""
+    signals.during(server.close, lambda _: server.abandon())
     if server.stuck:
         _tell((*server.unaccounted, *server.stuck))
         leave(Exit.UNKNOWN)

@@ -1,7 +1,7 @@
 """A server on a node of its own, from its start to its end: until a signal, or its executor dies.
 
-The order of the end: who is served is answered (drain), nothing spins any more, the server goes,
-then node and context. Knows nothing of what is served.
+The order of the end: the server answers whom it serves and goes, nothing spins any more, then node
+and context go. Knows nothing of what is served.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.shorten import fit
 
 
-class Server(Protocol):
+class Served(Protocol):
     """What is served."""
 
     def close(self) -> None:
-        """Be gone; nothing spins its node any more."""
+        """Be gone, while the node is spun."""
 
 
-AnyServer = TypeVar("AnyServer", bound=Server)
+AnyServed = TypeVar("AnyServed", bound=Served)
 
 
 def serve(
     command: str,
-    make: Callable[[Any], AnyServer],
+    make: Callable[[Any], AnyServed],
     *,
-    announce: Callable[[AnyServer], None],
-    drain: Callable[[AnyServer, Signals], None] = lambda server, signals: None,
-    conclude: Callable[[AnyServer, Exit], Exit],
+    announce: Callable[[AnyServed], None],
+    close: Callable[[AnyServed, Signals], None] = lambda server, _: server.close(),
+    conclude: Callable[[AnyServed, Exit], Exit],
     name: str,
     namespace: str = "",
     executor: str | None = None,
 ) -> Exit:
     """Serve what `make` makes of a node called `name`; return the exit code. Main thread only.
 
-    `announce` is called when the node is spun, `drain` while it still is, and `conclude` at the
-    end, with the exit code so far; it returns what that is to be.
+    `announce` and `close` are called while the node is spun, and `conclude` at the end, with the
+    exit code so far; it returns what that is to be.
     """
     with importing_ros():
         from bt_actions.ros.spinning import Spinner
@@ -58,8 +58,8 @@ def serve(
                 pass
         finally:
             if server is not None:
-                drain(server, signals)
-            spinner.stop(signals.poke, server.close if server is not None else None)
+                close(server, signals)
+            spinner.stop(signals.poke, None)
         code = conclude(server, Exit.FAILURE if spinner.error else Exit.SUCCESS)
         if spinner.error:
             note(f"bt-actions {command}: the executor died: {raised(spinner.error)}")

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Self, TypeVar
 from py_trees.behaviour import Behaviour
 
 from bt_actions.cli.driving.drive import Drive, Judge
-from bt_actions.cli.driving.presence import Presence
 from bt_actions.cli.driving.signals import Signals
 from bt_actions.cli.driving.simulated import Wanted, remark, wanted
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, leave, starting_ros
@@ -28,6 +27,7 @@ from bt_actions.cli.streams.writing import note
 from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.lines import LineView
 from bt_actions.cli.views.view import View
+from bt_actions.running.shown import ShownRun
 from bt_actions.story.state import State
 
 if TYPE_CHECKING:
@@ -82,8 +82,8 @@ class Session:
         if outlook is not None:
             outlook.hand_over()
         self._error: BaseException | None = None
-        self._presence = Presence(self._runner, root)
-        self._runner.on_close(lambda: self._presence.close(error=self._error))
+        self._shown = ShownRun(self._runner, root)
+        self._runner.on_close(lambda: self._shown.close(error=self._error))
         self._output = PatientOutput()
         self._simulator = None
         if simulation is not None:
@@ -152,7 +152,7 @@ class Session:
                 drive.run()
                 code = drive.finish(*self._world(part_at), judge)
                 if drive.abandoned:
-                    self._presence.close(left=True)
+                    self._shown.close(left=True)
                     leave(code)
                 signals.settle(code)
         finally:

@@ -1,28 +1,33 @@
 """SIGINT, SIGTERM, SIGHUP and SIGQUIT as bytes in a pipe, which the main thread reads in its time.
 
 A handler that did more than write a byte could run in the middle of anything, with any lock held.
-Nothing here decides what a signal means, only when a second one is the first.
+So the main thread only waits here, and all work is done on others; a library, whose main thread may
+be the one that works, has ros/signals.py. Nothing here decides what a signal means, only when a
+second one is the first.
 """
 
 from __future__ import annotations
 
 import atexit
 import contextlib
+import math
 import os
 import select
 import signal
 import threading
-from collections.abc import Iterable
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from types import FrameType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
+
+Result = TypeVar("Result")
 
 _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _MAY_BE_IGNORED = (signal.SIGHUP, signal.SIGQUIT)
 
 SAME_WISH = 0.25
 """A second signal within so many seconds is the first one, passed on by a wrapper (uv, a shell)."""
-
-
 _to_ignore: set[signal.Signals] = set()
 
 
@@ -31,13 +36,6 @@ def _ignore() -> None:
     """What is settled holds while Python takes itself down, too, where it has no handlers."""
     for number in _to_ignore:
         signal.signal(number, signal.SIG_IGN)
-
-
-def settle(numbers: Iterable[signal.Signals], code: int) -> None:
-    """From here on each of these signals ends the program at once, with this exit code."""
-    for number in numbers:
-        signal.signal(number, lambda _number, _frame: os._exit(code))
-    _to_ignore.update(numbers)
 
 
 class Signals:
@@ -52,6 +50,7 @@ class Signals:
             os.set_blocking(end, False)
         self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
         self._wakeup_before = -1
+        self._first_at = math.inf
         self._closing = threading.Lock()
         self._closed = False
         self._settled = False
@@ -76,13 +75,25 @@ class Signals:
     def settle(self, code: int) -> None:
         """It is told how this program ends: from here on a signal ends it at once, and as told."""
         self._settled = True
-        settle(self._before, code)
+        for number in self._before:
+            signal.signal(number, lambda _number, _frame: os._exit(code))
+        _to_ignore.update(self._before)
 
     def poke(self) -> None:
         """Wake the thread that waits; callable from any thread."""
         with self._closing, contextlib.suppress(BlockingIOError):  # full: it will wake anyway
             if not self._closed:
                 os.write(self._write, b"\0")
+
+    def during(self, work: Callable[[], Result], heard: Callable[[signal.Signals], None]) -> Result:
+        """Return what `work` returns on another thread; call `heard` with signals meanwhile."""
+        with ThreadPoolExecutor(1) as pool:
+            future = pool.submit(work)
+            future.add_done_callback(lambda _: self.poke())
+            while not future.done():
+                for number in self.wait(None)[0]:
+                    heard(number)
+        return future.result()
 
     def wait(
         self, timeout: float | None, *, readable: int = -1, writable: int = -1
@@ -106,7 +117,12 @@ class Signals:
             numbers = os.read(self._read, 65536)
         except BlockingIOError:
             return []
-        return [signal.Signals(number) for number in numbers if number in _ENDING]
+        taken = [signal.Signals(number) for number in numbers if number in _ENDING]
+        now = time.monotonic()
+        if taken and self._first_at == math.inf:
+            self._first_at = now
+            return taken[:1]
+        return taken if now - self._first_at > SAME_WISH else []
 
 
 def _only_the_byte(_number: int, _frame: FrameType | None) -> None:

@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from bt_actions.messages.interfaces import interface_name
+
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
@@ -41,7 +43,7 @@ def wanted(root: Behaviour, namespace: str = "") -> Wanted:
                 continue
             full = name if name.startswith("/") else f"{namespace}/{name}"
             above, _, last = full.rpartition("/")
-            package, word = _type_words(kind)
+            package, *_, word = (kind if isinstance(kind, str) else interface_name(kind)).split("/")
             if package == _PACKAGE and SERVED.get(word) == last:
                 namespaces[above or "/"] = None
             else:
@@ -55,12 +57,3 @@ def remark(found: Wanted) -> str:
         return ""
     names = " and ".join(SERVED.values())
     return f"--sim serves only {names}; it has no server for {', '.join(found.others)}"
-
-
-def _type_words(kind: object) -> tuple[str, str]:
-    """Package and name of an interface, given by its name or as a class."""
-    if isinstance(kind, str):
-        words = kind.split("/")
-    else:
-        words = [*str(getattr(kind, "__module__", "")).split("."), getattr(kind, "__name__", "")]
-    return words[0], words[-1]

@@ -5,13 +5,11 @@ from __future__ import annotations
 import functools
 import os
 import signal
-import time
-from collections.abc import Collection
-from types import FrameType
-from typing import TYPE_CHECKING, Any, Self
+from collections.abc import Callable, Collection
+from typing import TYPE_CHECKING
 
-from bt_actions.cli.driving.signals import SAME_WISH, settle
-from bt_actions.cli.exits import BadInput, Exit, importing_ros, refuse_domain
+from bt_actions.cli.driving.signals import Signals
+from bt_actions.cli.exits import Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.writing import OutputLost, discard_stdout, note, write
 from bt_actions.utilities.suggest import listing
 
@@ -33,52 +31,49 @@ def sweep(
 
     Where not every server of one of the `wanted` actions, which are full names, answers, or none of
     any action is in sight, and nobody says which are wanted, nobody can say: UNKNOWN. Main thread
-    only.
+    only. The first signal has the cleanup end in good order, and a second one does not wait.
     """
-    with _Stop() as stop:
-        swept = _sweep(stop, look, patience, accept, wanted)
-        stop.is_told = stop.signal is not None
-        if swept.elsewhere:
-            goals = (f"{goal_id.hex()} on {action}" for goal_id, action in swept.elsewhere.items())
-            note(
-                f"not touched: {listing(goals, 1)}: of bt_actions on another machine, or in "
-                "another container, where it cannot be seen whether it is alive (see "
-                "BT_ACTIONS_MACHINE)"
-            )
+    heard: list[signal.Signals] = []
+    found: list[LeftBehind] = []
+
+    def hear(number: signal.Signals) -> None:
+        if heard:
+            os._exit(Exit.UNKNOWN if found else 128 + number)
+        heard.append(number)
+
+    def clean_up() -> Exit:
+        swept = _sweep(look, patience, accept, wanted, found, lambda: bool(heard))
+        stopped_by = heard[0] if heard else None
         hint = "; start it" if wanted else ""
         hint += f", or {first}" if wanted and first else ""
-        code = _tell_what_is_open(swept, stop.signal, hint, any_will_do=wanted is not None)
-        tell = functools.partial(note, end="") if first else write  # whose results are to follow
-        try:
-            for goal in swept.left:
-                tell(_line(goal))
-            if code is Exit.SUCCESS and not swept.left:
-                tell(_nothing(swept))
-        except (OutputLost, BrokenPipeError):
-            if code is not Exit.UNKNOWN:
-                raise
-            discard_stdout()
-        if not first or code is not Exit.SUCCESS:
-            stop.settle(code)
+        code = _tell_what_is_open(swept, stopped_by, hint, any_will_do=wanted is not None)
+        # On standard output are the results of what is to follow
+        _tell(swept, code, functools.partial(note, end="") if first else write)
+        return code
+
+    with Signals() as signals:
+        code = signals.during(clean_up, hear)
+        if is_last := not first or code is not Exit.SUCCESS:
+            signals.settle(code)
+    if heard and not is_last:  # too late to be told
+        signal.raise_signal(heard[0])
     return code
 
 
 def _sweep(
-    stop: _Stop,
     look: float,
     patience: float,
     accept: float,
     wanted: Collection[str] | None,
+    found: list[LeftBehind],
+    stopped: Callable[[], bool],
 ) -> Swept:
-    """Look, and cancel; return what was seen."""
+    """Look, and cancel; return what was seen, and say meanwhile what is `found`."""
     with importing_ros():
         from bt_actions.recovery.sweep import Cleanup
-        from bt_actions.ros.onlooker import CannotStart
 
-    refuse_domain()
-
-    def found(left: LeftBehind) -> None:
-        stop.leaves_a_goal = True
+    def tell(left: LeftBehind) -> None:
+        found.append(left)
         if left.awaited:
             note(
                 f"dead process {left.pid} sent a goal to {left.call.action} that was not answered: "
@@ -94,18 +89,29 @@ def _sweep(
     def waits(names: list[str]) -> None:
         note(f"waiting for {listing(names)}, where something may have been left")
 
-    try:
+    with starting_ros():
         return Cleanup(
             look=look,
             patience=patience,
             accept=accept,
-            found=found,
+            found=tell,
             wanted=wanted,
             waits=waits,
-            stopped=lambda: stop.signal is not None,
+            stopped=stopped,
         ).run()
-    except CannotStart as error:
-        raise BadInput(f"ROS 2 cannot start: {error}") from error
+
+
+def _tell(swept: Swept, code: Exit, say: Callable[[str], object]) -> None:
+    """Say what became of each goal, or that nothing was left."""
+    try:
+        for goal in swept.left:
+            say(_line(goal))
+        if code is Exit.SUCCESS and not swept.left:
+            say(_nothing(swept))
+    except (OutputLost, BrokenPipeError):
+        if code is not Exit.UNKNOWN:
+            raise
+        discard_stdout()
 
 
 def _tell_what_is_open(
@@ -113,6 +119,13 @@ def _tell_what_is_open(
 ) -> Exit:
     """Say what is not known, which may be something to wait for; return the exit code."""
     code = Exit.SUCCESS
+    if swept.elsewhere:
+        goals = (f"{goal_id.hex()} on {action}" for goal_id, action in swept.elsewhere.items())
+        note(
+            f"not touched: {listing(goals, 1)}: of bt_actions on another machine, or in "
+            "another container, where it cannot be seen whether it is alive (see "
+            "BT_ACTIONS_MACHINE)"
+        )
     if stopped_by is not None:
         note(f"stopped by {stopped_by.name} before all was seen")
         code = Exit(128 + stopped_by)
@@ -153,46 +166,3 @@ def _nothing(swept: Swept) -> str:
     if swept.unknown:
         where = f"{where} of {seen + len(swept.unknown)}"
     return f"{nothing} is left to cancel on the {where} in sight in ROS domain {swept.domain}\n"
-
-
-class _Stop:
-    """The first signal is noted, for the sweep to end in good order; a second one does not wait.
-
-    Of those that are at their default, from `__enter__` to `__exit__`; main thread only.
-    """
-
-    def __init__(self) -> None:
-        self.signal: signal.Signals | None = None
-        self.is_told = False
-        """Whether the user is told of it; one that came too late for that takes effect at the end,
-        unless that is settled."""
-        self.leaves_a_goal = False
-        self._at = 0.0
-        self._settled = False
-        self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
-
-    def __enter__(self) -> Self:
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
-            if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
-                self._before[number] = signal.signal(number, self._came)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._settled:
-            return
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-        if self.signal is not None and not self.is_told:
-            signal.raise_signal(self.signal)
-
-    def settle(self, code: Exit) -> None:
-        """The program ends with this code, whatever comes."""
-        self._settled = True
-        settle(self._before, code)
-
-    def _came(self, number: int, _frame: FrameType | None) -> None:
-        if self.signal is None:
-            self.signal = signal.Signals(number)
-            self._at = time.monotonic()
-        elif time.monotonic() - self._at > SAME_WISH:
-            os._exit(Exit.UNKNOWN if self.leaves_a_goal else 128 + number)

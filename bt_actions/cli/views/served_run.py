@@ -11,9 +11,10 @@ from bt_actions.cli.views.one_goal import GoalView
 from bt_actions.events import Node, Value
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.table import table
-from bt_actions.story.values import brief, opened
-from bt_actions.utilities.places import told_apart
+from bt_actions.story.values import opened
+from bt_actions.utilities.names import told_apart
 from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import brief
 
 _NOT_NOW = ("BUSY", "INACTIVE")
 """Codes of rejections that say nothing against the tree or its inputs."""

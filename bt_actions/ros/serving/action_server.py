@@ -12,19 +12,14 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 from action_msgs.msg import GoalStatus
-from rclpy.action.server import (
-    ActionServer,
-    CancelResponse,
-    GoalResponse,
-    RCLError,
-    ServerGoalHandle,
-)
+from rclpy.action.server import CancelResponse, GoalResponse, RCLError, ServerGoalHandle
 
 from bt_actions.ros.naming import warn_of_remapping
 from bt_actions.ros.serving.endpoints import Endpoints
+from bt_actions.ros.workarounds.action_server import ClosableActionServer
 
 
-class DeferredActionServer(ActionServer):  # type: ignore[misc]
+class DeferredActionServer(ClosableActionServer):
     """An action server that leaves it to others when a goal is executed and when it has ended.
 
     Args:
@@ -63,18 +58,12 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
             endpoints.node,
             action_type,
             name,
-            execute_callback=self.answer,  # never called: see notify_execute
             callback_group=endpoints.group,
             goal_callback=self._on_goal,
             handle_accepted_callback=self._on_accepted,
             cancel_callback=lambda goal: CancelResponse.ACCEPT,
             result_timeout=keeps,
         )
-
-    def notify_execute(
-        self, goal_handle: ServerGoalHandle, execute_callback: Callable[..., Any]
-    ) -> None:
-        """Do nothing: `goal_handle.execute()` has marked the goal as executing, and that is all."""
 
     def begin(self, goal: ServerGoalHandle) -> None:
         """Mark it as executing, unless it is being canceled."""
@@ -98,13 +87,6 @@ class DeferredActionServer(ActionServer):  # type: ignore[misc]
             status=goal.status, result=result
         )
         self._result_futures[bytes(goal.goal_id.uuid)].set_result(response)
-
-    # rclpy would have the executor send a result; so it is sent by whoever answers, or asks for it.
-
-    def add_future(self, future: Any) -> None:
-        """Do nothing: a result is not the executor's."""
-
-    remove_future = add_future
 
     # Requests; on the executor's threads
 

@@ -20,6 +20,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 
+from bt_actions.ros.workarounds.closable import closable, closable_service
+
 _NUDGE = 0.01
 """Seconds between two reminders of an executor that something awaited is there."""
 _SPUN = 10.0
@@ -79,14 +81,13 @@ class Endpoints:
 
         While it is `silent`, nobody is answered: of two answers a client takes the first.
         """
-        service = self.node.create_service(kind, name, callback, callback_group=self.group)
-        send = service.send_response
-        service.send_response = lambda *answer: None if silent() else send(*answer)
+        made = self.node.create_service(kind, name, callback, callback_group=self.group)
+        service = closable_service(made, silent)
         self._made.callback(self.node.destroy_service, service)
 
     def publisher(self, kind: type, topic: str, qos: QoSProfile | int) -> Any:
         """Return a publisher."""
-        publisher = self.node.create_publisher(kind, topic, qos)
+        publisher = closable(self.node.create_publisher(kind, topic, qos))
         self._made.callback(self.node.destroy_publisher, publisher)
         return publisher
 

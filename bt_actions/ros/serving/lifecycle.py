@@ -15,8 +15,8 @@ from lifecycle_msgs.msg import State, Transition, TransitionDescription, Transit
 from lifecycle_msgs.srv import ChangeState, GetAvailableStates, GetAvailableTransitions, GetState
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
+from bt_actions.ros.rosout import Tell
 from bt_actions.ros.serving.endpoints import Endpoints
-from bt_actions.ros.serving.telling import Telling
 from bt_actions.utilities.plain_text import in_words
 
 
@@ -28,7 +28,7 @@ class Lifecycle:
     """
 
     def __init__(
-        self, endpoints: Endpoints, steps: Mapping[str, Callable[[], None]], tell: Telling
+        self, endpoints: Endpoints, steps: Mapping[str, Callable[[], None]], tell: Tell
     ) -> None:
         node = self._node = endpoints.node
         self._steps, self._off, self._say = steps, endpoints.off, tell

@@ -15,10 +15,10 @@ from collections.abc import Callable
 from builtin_interfaces.msg import Time
 from rclpy.exceptions import InvalidHandle
 
-from bt_actions.goals.ids import author_of, new_goal_id
 from bt_actions.ros import graph
+from bt_actions.ros.rosout import Tell
 from bt_actions.ros.serving.endpoints import Endpoints
-from bt_actions.ros.serving.telling import Telling
+from bt_actions.utilities.ids import author_of, new_id
 
 LOOK = 1.0
 """Seconds in which a new server is shown one that is there (0.04 to 0.6 measured)."""
@@ -28,13 +28,13 @@ _UNCLAIMED = 2.0
 """Seconds for which a server is in sight until its topic is, too, if it has one;"""
 _UNCLAIMED_AT_START = 0.3
 """and before this one has answered anybody, when to yield for a moment costs nothing."""
-_CLAIM = re.compile(r"/_since/t(\d{20})_([0-9a-f]{32})$")
+_CLAIM = re.compile(r"/_since/t\d{20}_[0-9a-f]{32}$")
 
 
 class Precedence:
     """Looks once a second whether others come before one server of an action, and says so."""
 
-    def __init__(self, endpoints: Endpoints, action: str, say: Telling) -> None:
+    def __init__(self, endpoints: Endpoints, action: str, say: Tell) -> None:
         self._node, self._say = endpoints.node, say
         self._lock = threading.Lock()
         self.why = ""
@@ -42,7 +42,7 @@ class Precedence:
         self.regained: Callable[[], None] = lambda: None
         """Called when another server had to answer, and this one is to answer now."""
         self._action = self._node.resolve_topic_name(action, only_expand=True)
-        self._mine = f"/_since/t{time.time_ns():020d}_{new_goal_id().hex()}"
+        self._mine = f"/_since/t{time.time_ns():020d}_{new_id().hex()}"
         endpoints.publisher(Time, f"{self._action}{self._mine}", 1)
         self._begun = time.monotonic()
         self._unclaimed_since: float | None = None
@@ -89,7 +89,7 @@ class Precedence:
         here = [name for name in names if name.startswith(f"{self._action}/_since/")]
         claims = sorted(found[0] for found in map(_CLAIM.search, here) if found)
         for claim in claims[: claims.index(self._mine)] if self._mine in claims else claims:
-            if who := _claimant(claim):
+            if who := _claimant(bytes.fromhex(claim[-32:])):
                 return f"{who} has served {self._action} for longer"
         if servers <= len(claims):
             self._unclaimed_since = None
@@ -102,10 +102,9 @@ class Precedence:
         return f"another server of {self._action} is in sight, which is no server of trees"
 
 
-def _claimant(claim: str) -> str:
-    """Whose claim it is, in words; "" for a process that is dead."""
-    found = _CLAIM.search(claim)
-    author = author_of(bytes.fromhex(found[2])) if found else None
+def _claimant(claimed_by: bytes) -> str:
+    """Whose id it is, in words; "" for a process that is dead."""
+    author = author_of(claimed_by)
     if author is None or not author.here:
         return "a process on another machine"
     return f"process {author.pid}" if author.alive else ""

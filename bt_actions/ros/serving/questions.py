@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Generator, Iterator
-from typing import Any, Self
+from collections.abc import Callable, Iterator
+from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from bt_actions.messages.interfaces import interface_name
 from bt_actions.ros.connections import DISCOVERS
-from bt_actions.ros.naming import own_node
+from bt_actions.ros.naming import passing_node
 from bt_actions.ros.serving.endpoints import kept
-from bt_actions.ros.workarounds import participant
 
 PATIENCE = 5.0
 """Seconds for a server to come in sight, and for one to answer."""
@@ -22,34 +21,6 @@ AGAIN = 1.0
 """Seconds after which a request without an answer is sent again."""
 GLANCE = 0.05
 """Seconds between two looks."""
-
-
-@contextlib.contextmanager
-def _asking() -> Iterator[Node]:
-    node = own_node("bt_actions_asks")
-    executor = SingleThreadedExecutor(context=node.context)
-    executor.add_node(node)
-    try:
-        yield node
-    finally:
-        executor.shutdown()
-        participant.close(node)
-
-
-def heard(message_type: type, depth: int) -> Generator[Any]:
-    """Yield what is kept on every topic of a type, for some seconds; see `kept`."""
-    came: list[Any] = []
-    known: set[str] = set()
-    until = time.monotonic() + PATIENCE
-    with _asking() as node:
-        while time.monotonic() < until:
-            for topic, types in node.get_topic_names_and_types():
-                if interface_name(message_type) in types and topic not in known:
-                    known.add(topic)
-                    node.create_subscription(message_type, topic, came.append, kept(depth))
-            node.executor.spin_once(GLANCE)
-            yield from came
-            came.clear()
 
 
 class _Question:
@@ -76,48 +47,67 @@ class _Question:
 
 
 class Asker:
-    """Calls one service after another; a context manager."""
+    """Hears topics and calls services on a node, which it spins itself."""
 
-    def __enter__(self) -> Self:
-        self._context = _asking()
-        self._node = self._context.__enter__()
-        return self
+    def __init__(self, node: Node) -> None:
+        self._node = node
 
-    def __exit__(self, *error: Any) -> None:
-        self._context.__exit__(*error)
+    def heard(self, message_type: type, depth: int) -> Iterator[Any]:
+        """Yield what is kept on every topic of a type, for some seconds; see `kept`."""
+        came: list[Any] = []
+        known: set[str] = set()
+        for _ in self._looks(PATIENCE):
+            yield from came
+            came.clear()
+            for topic, types in self._node.get_topic_names_and_types():
+                if interface_name(message_type) in types and topic not in known:
+                    known.add(topic)
+                    self._node.create_subscription(message_type, topic, came.append, kept(depth))
 
     def find(self, service_type: type, fits: Callable[[str], bool]) -> str:
         """Return the first service of a type whose name fits; "" where none comes in sight."""
-        until = time.monotonic() + PATIENCE
-        while time.monotonic() < until:
+        for _ in self._looks(PATIENCE):
             for name, types in sorted(self._node.get_service_names_and_types()):
                 if interface_name(service_type) in types and fits(name):
                     return str(name)
-            self._node.executor.spin_once(GLANCE)
         return ""
 
     def ask(self, service_type: Any, name: str, request: Any) -> Any:
         """Return what a service answers; None where it does not."""
         question = _Question(self._node, service_type, name, request)
-        until = time.monotonic() + PATIENCE
-        while (answer := question.answer()) is None and time.monotonic() < until:
-            self._node.executor.spin_once(GLANCE)
-        return answer
+        answers = (question.answer() for _ in self._looks(PATIENCE))
+        return next((each for each in answers if each is not None), None)
 
-
-def answers(service_type: Any, namespace: str) -> dict[str, Any]:
-    """Ask every service of a type below a namespace; by its name, None where it does not answer."""
-    below = f"/{namespace.strip('/')}/".replace("//", "/")
-    asked: dict[str, _Question] = {}
-    begun = time.monotonic()
-    with _asking() as node:
-        while (now := time.monotonic() - begun) < PATIENCE + (DISCOVERS if asked else 0.0):
-            for name, types in node.get_service_names_and_types():
+    def answers(self, service_type: Any, namespace: str) -> dict[str, Any]:
+        """Ask every service of a type below a namespace; by its name, None: it does not answer."""
+        below = f"/{namespace.strip('/')}/".replace("//", "/")
+        asked: dict[str, _Question] = {}
+        for passed in self._looks(PATIENCE + DISCOVERS):
+            for name, types in self._node.get_service_names_and_types():
                 fits = interface_name(service_type) in types and name.startswith(below)
                 if fits and name not in asked:
-                    asked[name] = _Question(node, service_type, name, service_type.Request())
+                    request = service_type.Request()
+                    asked[name] = _Question(self._node, service_type, name, request)
             missing = [each for each in asked.values() if each.answer() is None]
-            if now >= DISCOVERS and asked and not missing:
+            if passed >= (DISCOVERS if asked else PATIENCE) and not missing:
                 break
-            node.executor.spin_once(GLANCE)
         return {name: asked[name].answer() for name in sorted(asked)}
+
+    def _looks(self, seconds: float) -> Iterator[float]:
+        """Yield the time that has passed, again and again; take in what comes in between."""
+        begun = time.monotonic()
+        while (passed := time.monotonic() - begun) < seconds:
+            yield passed
+            self._node.executor.spin_once(GLANCE)
+
+
+@contextlib.contextmanager
+def asking() -> Iterator[Asker]:
+    """Ask with a participant that is gone afterwards."""
+    with passing_node("bt_actions_asks") as node:
+        executor = SingleThreadedExecutor(context=node.context)
+        executor.add_node(node)
+        try:
+            yield Asker(node)
+        finally:
+            executor.shutdown()

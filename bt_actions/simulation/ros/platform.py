@@ -19,7 +19,7 @@ from rclpy.expand_topic_name import expand_topic_name
 from rclpy.node import Node
 
 from bt_actions.ros.workarounds.closable import closable
-from bt_actions.simulation.platform import Log, Server
+from bt_actions.simulation.platform import RequestHandler, SimulationLog
 from bt_actions.simulation.ros.wire import InterceptedActionServer
 
 SHORTEST_WAIT = 0.0001
@@ -34,8 +34,8 @@ class NodePlatform:
         self._group = MutuallyExclusiveCallbackGroup()
 
     @property
-    def log(self) -> Log:
-        logger: Log = self._node.get_logger()
+    def log(self) -> SimulationLog:
+        logger: SimulationLog = self._node.get_logger()
         return logger
 
     def now(self) -> float:
@@ -48,7 +48,7 @@ class NodePlatform:
         return str(expand_topic_name(name, self._node.get_name(), self._node.get_namespace()))
 
     def serve(
-        self, action_type: Any, name: str, server: Server, result_timeout: float
+        self, action_type: Any, name: str, server: RequestHandler, result_timeout: float
     ) -> InterceptedActionServer:
         return InterceptedActionServer(
             self._node,

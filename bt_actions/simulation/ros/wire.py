@@ -1,36 +1,26 @@
 """The server side of an action on rclpy: an action server whose requests others see first.
 
-What the middleware brings is shown to a `Server`, which may keep it: to lose it, or to give it
+What the middleware brings is shown to a `RequestHandler`, which may keep it: to lose it, or give it
 back later. Goals are executed by that server: `start` only changes the state, `finish` sends the
-result. Nothing is decided here. Destroying the server while its executor spins is safe; in rclpy
-it is not (a request taken at that moment raises InvalidHandle in the executor, which ends its
-spin).
+result. Nothing is decided here.
 """
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
 
 from action_msgs.msg import GoalInfo
-from rclpy.action.server import (
-    ActionServer,
-    CancelResponse,
-    GoalResponse,
-    RCLError,
-    ServerGoalHandle,
-)
-from rclpy.exceptions import InvalidHandle
+from rclpy.action.server import CancelResponse, GoalResponse, RCLError, ServerGoalHandle
 from rclpy.node import Node
 from rclpy.task import Future
-from rclpy.waitable import NumberOfEntities
 
 from bt_actions.goals.terms import STATUS_CANCELED, STATUS_SUCCEEDED
-from bt_actions.simulation.platform import Request, Server
-from bt_actions.utilities.plain_text import raised
+from bt_actions.ros.workarounds.action_server import ClosableActionServer
+from bt_actions.simulation.platform import Request, RequestHandler
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,58 +41,31 @@ class Taken:
         return self.message.goal
 
 
-class InterceptedActionServer(ActionServer):  # type: ignore[misc]
+class InterceptedActionServer(ClosableActionServer):
     """See the head of this file."""
 
     def __init__(
-        self, node: Node, action_type: Any, name: str, server: Server, **settings: Any
+        self, node: Node, action_type: Any, name: str, server: RequestHandler, **settings: Any
     ) -> None:
         """Serve on `node`; `settings` are those of rclpy's ActionServer."""
         self._server = server
-        self._gone = False
         super().__init__(
             node,
             action_type,
             name,
-            execute_callback=_nothing,
             goal_callback=self._decided,
             handle_accepted_callback=self._accepted,
             cancel_callback=self._canceled,
             **settings,
         )
 
-    # rclpy calls these four while it builds its wait set and takes data, from the spinning thread,
-    # without expecting that the server may have been destroyed since the loop began.
-
-    def get_num_entities(self) -> NumberOfEntities:
-        with self._unless_gone():
-            return super().get_num_entities()
-        return NumberOfEntities(0, 0, 0, 0, 0)
-
-    def add_to_wait_set(self, wait_set: Any) -> None:
-        with self._unless_gone():
-            super().add_to_wait_set(wait_set)
-
-    def is_ready(self, wait_set: Any) -> bool:
-        with self._unless_gone():
-            return not self._gone and bool(super().is_ready(wait_set))
-        return False
-
-    def take_data(self) -> dict[str, Any]:
-        with self._unless_gone():
-            return {} if self._gone else dict(super().take_data())
-        return {}
-
     async def execute(self, taken_data: Any) -> None:
         """Answer what was taken, each request on its own, unless the server keeps it."""
         for kind, taken in taken_data.items():
             if kind == "expired":
-                await self._guarded(super().execute({kind: taken}))
-            elif self._shown(request := Taken(kind, *taken)):
-                await self._answer(request)
-
-    def notify_execute(self, goal_handle: ServerGoalHandle, execute_callback: Any) -> None:
-        """Run nothing: the goal is executed step by step, see `finish`."""
+                await super().execute({kind: taken})
+            else:
+                await self.guarded(self._show, Taken(kind, *taken))
 
     # For the server
 
@@ -140,37 +103,30 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
 
         Of a coroutine that it has and never begins Python would warn.
         """
-        if not self._gone and (executor := self._node.executor) is not None:
-            executor.create_task(partial(_to_its_end, work, *arguments))
-
-    def destroy(self) -> None:
-        if self._gone:
-            return
-        self._gone = True
-        super().destroy()
-
-    def _send_result_response(self, request_header: Any, future: Any) -> None:
-        try:
-            super()._send_result_response(request_header, future)
-        except Exception as error:  # noqa: BLE001 - rclpy calls this as a task: it would end spin()
-            if not self._gone:
-                self._logger.error(f"simulation: a result could not be sent: {raised(error)}")
+        if not self.gone and (executor := self._node.executor) is not None:
+            executor.create_task(partial(_to_its_end, self.guarded, work, *arguments))
 
     async def _finish(self, goal_id: str, result: Any) -> None:
         # The server may go, or the goal expire, between `finish` and this task of the executor.
         handle = self._goal_handles.get(bytes.fromhex(goal_id))
-        if not self._gone and handle is not None:
-            await self._guarded(self._execute_goal(lambda handle: result, handle))
+        if not self.gone and handle is not None:
+            await self._execute_goal(lambda handle: result, handle)
+
+    async def _show(self, request: Taken) -> None:
+        if not self.gone and self._server.on_request(request):
+            await self._answer(request)
 
     async def _answer(self, request: Taken) -> None:
-        if not self._gone:
-            await self._guarded(super().execute({request.kind: (request.header, request.message)}))
-            self._tell(request)
+        await super().execute({request.kind: (request.header, request.message)})
+        self._tell(request)
 
     async def _accept_silently(self, request: Taken) -> None:
-        if not self._gone:
-            await self._guarded(self._accept_unanswered(request.message))
-            self._tell(request)
+        await self._accept_unanswered(request.message)
+        self._tell(request)
+
+    def _tell(self, request: Taken) -> None:
+        if not self.gone:
+            self._server.on_answered(request)
 
     async def _accept_unanswered(self, request: Any) -> None:
         """Do what rclpy's _execute_goal_request does, without its answer."""
@@ -187,7 +143,6 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
         key = bytes(request.goal_id.uuid)
         self._goal_handles[key] = handle
         self._result_futures[key] = Future()
-        self.add_future(self._result_futures[key])
         self._handle.publish_status()
         self._accepted(handle)
 
@@ -201,38 +156,6 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
         granted = self._server.cancel(_hex(handle.goal_id))
         return CancelResponse.ACCEPT if granted else CancelResponse.REJECT
 
-    def _shown(self, request: Taken) -> bool:
-        if self._gone:
-            return False
-        try:
-            return self._server.on_request(request)
-        except Exception as error:  # noqa: BLE001 - it would end spin()
-            self._logger.error(f"simulation: at a {request.kind} request: {raised(error)}")
-            return True
-
-    def _tell(self, request: Taken) -> None:
-        if self._gone:
-            return
-        try:
-            self._server.on_answered(request)
-        except Exception as error:  # noqa: BLE001 - it would end spin()
-            self._logger.error(f"simulation: after a {request.kind} request: {raised(error)}")
-
-    @contextlib.contextmanager
-    def _unless_gone(self) -> Iterator[None]:
-        try:
-            yield
-        except (InvalidHandle, RCLError):
-            if not self._gone:
-                raise
-
-    async def _guarded(self, work: Any) -> None:
-        try:
-            await work
-        except Exception as error:  # noqa: BLE001 - it would end spin()
-            if not self._gone:
-                self._logger.error(f"simulation: {raised(error)}")
-
 
 def _to_its_end(work: Callable[..., Coroutine[Any, Any, None]], *arguments: Any) -> None:
     with contextlib.suppress(StopIteration):
@@ -241,7 +164,3 @@ def _to_its_end(work: Callable[..., Coroutine[Any, Any, None]], *arguments: Any)
 
 def _hex(goal_id: Any) -> str:
     return bytes(goal_id.uuid).hex()
-
-
-def _nothing(goal_handle: ServerGoalHandle) -> None:
-    """Stand in where rclpy wants an execute callback; it is never called."""

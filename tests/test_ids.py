@@ -9,22 +9,20 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions.goals.ids import MACHINE, _name_of_machine, author_of, new_goal_id
+from bt_actions.utilities.ids import MACHINE, _name_of_machine, author_of, new_id
 
-MAKE = (
-    "from bt_actions.goals.ids import new_goal_id; print(new_goal_id().hex(), flush=True); input()"
-)
+MAKE = "from bt_actions.utilities.ids import new_id; print(new_id().hex(), flush=True); input()"
 
 
 def test_an_id_names_the_process_that_made_it_and_that_it_is_alive() -> None:
-    author = author_of(new_goal_id())
+    author = author_of(new_id())
     assert author is not None
     assert (author.pid, author.here, author.alive) == (os.getpid(), True, True)
 
 
 def test_ids_never_repeat_whatever_thread_makes_them() -> None:
     with ThreadPoolExecutor(8) as pool:
-        made = list(pool.map(lambda _: new_goal_id(), range(5000)))
+        made = list(pool.map(lambda _: new_id(), range(5000)))
     assert len(set(made)) == 5000
     assert {len(goal_id) for goal_id in made} == {16}
 
@@ -44,7 +42,7 @@ def test_the_author_of_a_killed_process_is_dead() -> None:
 
 
 def test_a_pid_that_was_given_to_another_process_is_not_the_author() -> None:
-    ours = bytearray(new_goal_id())
+    ours = bytearray(new_id())
     ours[10] ^= 0xFF
     author = author_of(bytes(ours))
     assert author is not None
@@ -58,16 +56,16 @@ def test_a_process_that_cannot_be_looked_at_counts_as_alive(
     def refused(self: Path, **_: object) -> str:
         raise error
 
-    author = author_of(new_goal_id())
+    author = author_of(new_id())
     assert author is not None
     monkeypatch.setattr(Path, "read_text", refused)
-    monkeypatch.setattr("bt_actions.goals.ids._machine", lambda: b"any")
+    monkeypatch.setattr("bt_actions.utilities.ids._machine", lambda: b"any")
     assert author.alive
     assert not replace(author, pid=2**22 + 1).alive, "no such process"
 
 
 def test_an_id_from_another_machine_counts_as_alive() -> None:
-    theirs = bytearray(new_goal_id())
+    theirs = bytearray(new_id())
     theirs[3] ^= 0xFF
     author = author_of(bytes(theirs))
     assert author is not None
@@ -78,14 +76,14 @@ def test_an_id_from_another_machine_counts_as_alive() -> None:
 def test_a_name_of_its_own_makes_a_container_the_same_machine_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("bt_actions.goals.ids._name_of_machine", lambda _: "of the first start")
-    monkeypatch.setattr("bt_actions.goals.ids._made_by", None)
-    unnamed = new_goal_id()
+    monkeypatch.setattr("bt_actions.utilities.ids._name_of_machine", lambda _: "of the first start")
+    monkeypatch.setattr("bt_actions.utilities.ids._made_by", None)
+    unnamed = new_id()
     monkeypatch.setenv(MACHINE, "arm 1")
-    monkeypatch.setattr("bt_actions.goals.ids._made_by", None)
-    named = new_goal_id()
-    monkeypatch.setattr("bt_actions.goals.ids._name_of_machine", lambda _: "of the second")
-    monkeypatch.setattr("bt_actions.goals.ids._made_by", None)
+    monkeypatch.setattr("bt_actions.utilities.ids._made_by", None)
+    named = new_id()
+    monkeypatch.setattr("bt_actions.utilities.ids._name_of_machine", lambda _: "of the second")
+    monkeypatch.setattr("bt_actions.utilities.ids._made_by", None)
     assert [author_of(each).here for each in (unnamed, named)] == [False, True]  # type: ignore[union-attr]
     monkeypatch.setenv(MACHINE, "arm 2")
     assert not author_of(named).here  # type: ignore[union-attr]

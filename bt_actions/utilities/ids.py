@@ -1,8 +1,9 @@
-"""Goal ids that tell which process chose them, so that what a killed one left can be found. No ROS.
+"""Ids that tell which process chose them, so that what a killed one left can be found. No ROS.
 
-A goal id is 16 bytes and ours to choose: 3 bytes that say "bt_actions", 3 for the machine (its pid
-and time namespaces included), 4 for the process id, 2 for the moment that process started, and 4
-that differ within it. An id made elsewhere has the first six bytes by accident once in 2**48.
+An id has the 16 bytes of a goal's, which is ours to choose: 3 that say "bt_actions", 3 for the
+machine (its pid and time namespaces included), 4 for the process id, 2 for the moment that process
+started, and 4 that differ within it. An id made elsewhere has the first six bytes by accident once
+in 2**48.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _made_by: tuple[int, bytes, itertools.count[int]] | None = None
 
 @dataclass(frozen=True, slots=True)
 class Author:
-    """The process that chose a goal id."""
+    """The process that chose an id."""
 
     here: bool
     """On this machine, where its process can be looked for."""
@@ -48,8 +49,8 @@ class Author:
         )
 
 
-def new_goal_id() -> bytes:
-    """Return a goal id that carries this process's identity."""
+def new_id() -> bytes:
+    """Return an id that carries this process's identity."""
     global _made_by
     pid = os.getpid()
     with _lock:

@@ -1,9 +1,6 @@
-"""Where a behaviour stands in its tree. No ROS."""
+"""Where a behaviour stands in its tree."""
 
 from __future__ import annotations
-
-from collections import Counter
-from collections.abc import Iterable
 
 from py_trees.behaviour import Behaviour
 
@@ -22,18 +19,6 @@ def path_of(behaviour: Behaviour) -> tuple[str, ...]:
         behaviour = behaviour.parent
         names.append(behaviour.name)
     return tuple(reversed(names))
-
-
-def told_apart(paths: Iterable[tuple[str, ...]]) -> dict[tuple[str, ...], str]:
-    """Return for each path its name, behind as much of the path as no other one ends with."""
-    texts: dict[tuple[str, ...], str] = {}
-    left, size = set(paths), 1
-    while left:
-        ends = Counter(path[-size:] for path in left)
-        done = {path for path in left if ends[path[-size:]] == 1 or size >= len(path)}
-        texts |= {path: " / ".join(path[-size:]) for path in done}
-        left, size = left - done, size + 1
-    return texts
 
 
 def culprit_of(error: BaseException) -> Behaviour | None:

@@ -1,6 +1,6 @@
 """What ROS sees of a run beside its goals: its inputs as parameters, and its life on `/rosout`.
 
-What it says is also what the run prints, so nothing here prints anything but a warning.
+What is said on `/rosout` is printed by nothing here. Knows ROS by wiring.py alone.
 """
 
 from __future__ import annotations
@@ -11,26 +11,23 @@ from typing import TYPE_CHECKING
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from bt_actions.cli.streams.writing import note
+from bt_actions import wiring
 from bt_actions.document import given_inputs
+from bt_actions.document.language.types import parse_type
 from bt_actions.events import Event, RunBegan
 from bt_actions.story.state import State
-from bt_actions.story.values import brief
 from bt_actions.story.why import causes
 from bt_actions.utilities.plain_text import clean, in_words
+from bt_actions.utilities.shorten import brief
 
 if TYPE_CHECKING:
     from bt_actions.running.runner import TreeRunner
 
 
-class Presence:
+class ShownRun:
     """Shows one run on its node, which `close` has to find alive."""
 
     def __init__(self, runner: TreeRunner, root: Behaviour) -> None:
-        from bt_actions.document.language.types import parse_type
-        from bt_actions.ros.parameters import declare_input
-        from bt_actions.ros.rosout import Rosout
-
         self._runner = runner
         self._state = State()  # of its own: the views' is read on the main thread
         self._begun = self._closed = False
@@ -39,10 +36,13 @@ class Presence:
             unit = f" ({each.unit})" if each.unit else ""
             kind = parse_type(each.type)
             description = f"{each.description}{unit}".strip()
-            if kind is not None and not declare_input(runner.node, name, kind, value, description):
-                note(f"bt-actions: the input {name!r} is shown as no parameter of the node: ROS has"
-                     " one of that name; --set gives it a value")  # fmt: skip
-        self._rosout = Rosout(runner.node)
+            given_as = runner.node, name, kind, value, description
+            if kind is not None and not wiring.declare_input(*given_as):
+                wiring.log().warning(
+                    f"the input {name!r} is shown as no parameter of the node: ROS has one of that "
+                    "name; its value is the tree's all the same"
+                )
+        self._rosout = wiring.rosout(runner.node)
         runner.observe(self._observe)
 
     def _observe(self, event: Event) -> None:
