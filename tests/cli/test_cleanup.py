@@ -6,6 +6,7 @@ import errno
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,9 @@ from typing import Any
 import pytest
 
 from bt_actions.cli import main
+from bt_actions.cli.driving import sweep as module
 from bt_actions.cli.driving.signals import SAME_WISH
-from bt_actions.cli.driving.sweep import _Stop, sweep
+from bt_actions.cli.driving.sweep import sweep
 from bt_actions.goals.policy import End
 from bt_actions.recovery.roll_call import LeftBehind, RollCall
 from bt_actions.recovery.sweep import Cleanup, Swept
@@ -173,26 +175,45 @@ def test_a_second_signal_does_not_wait(
 ) -> None:
     ended: list[int] = []
     monkeypatch.setattr(os, "_exit", ended.append)
-    with _Stop() as stop:
-        stop.leaves_a_goal = leaves_a_goal
-        signal.raise_signal(signal.SIGINT)
-        signal.raise_signal(signal.SIGINT)
-        assert ended == [], "a wrapper has passed on the first"
-        assert holds_for(lambda: stop.signal is signal.SIGINT, 1.2 * SAME_WISH)
-        signal.raise_signal(signal.SIGINT)
-        stop.is_told = True
+
+    def run(cleanup: Cleanup) -> Swept:
+        """Hang, whatever comes."""
+        if leaves_a_goal:
+            cleanup.found(LeftBehind(RollCall("/move"), bytes(16), 1))
+        os.kill(os.getpid(), signal.SIGINT)
+        until(cleanup.stopped)
+        os.kill(os.getpid(), signal.SIGINT)
+        assert holds_for(lambda: not ended, 1.2 * SAME_WISH), "a wrapper has passed on the first"
+        os.kill(os.getpid(), signal.SIGINT)
+        until(lambda: ended)
+        return Swept([], ["/move"], {}, 7, None, [], {})
+
+    monkeypatch.setattr(Cleanup, "run", run)
+    sweep(0.1, 0.1)
     assert ended == [code]
 
 
-def test_a_signal_that_comes_too_late_to_be_told_takes_effect_in_the_end() -> None:
+def test_a_signal_that_comes_too_late_to_be_told_takes_effect_in_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Before a run, say, which is to begin when all is cleaned up."""
-    with pytest.raises(KeyboardInterrupt), _Stop():
-        signal.raise_signal(signal.SIGINT)
+    late = threading.Event()
+
+    def say_late(_: Swept) -> str:
+        os.kill(os.getpid(), signal.SIGINT)
+        late.wait(2 * SAME_WISH)  # the main thread has it by then
+        return "nothing"
+
+    monkeypatch.setattr(Cleanup, "run", lambda _: Swept([], ["/move"], {}, 7, None, [], {}))
+    monkeypatch.setattr(module, "_nothing", say_late)
+    with pytest.raises(KeyboardInterrupt):
+        sweep(0.1, 0.1, first="do not")
 
 
 TOO_LATE = """
 import os, signal, sys
 from bt_actions.cli import main
+from bt_actions.cli.driving import sweep as module
 from bt_actions.recovery import sweep as cleanup
 cleanup.Cleanup.run = lambda _: cleanup.Swept([], [], {}, 7, None, [], {})
 main(["cleanup"])

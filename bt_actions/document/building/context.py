@@ -5,10 +5,11 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from operator import attrgetter
 from typing import Any
 
+from bt_actions.behaviours.reading import Formula, Names
 from bt_actions.behaviours.topics import TopicValue
 from bt_actions.document.building.scope import Scope
 from bt_actions.document.language.bounds import refuse_large
@@ -22,12 +23,7 @@ from bt_actions.document.yaml.nodes import Scalar
 from bt_actions.expressions.expression import Expression
 from bt_actions.messages import fields
 
-__all__ = ["Condition", "Context", "plain_name", "table_of", "written_text"]
-
-
-Root = str | Callable[[Any], Mapping[str, object]] | None
-"""The bare name that an expression has for what it is a function of; or what gives several."""
-
+__all__ = ["Context", "plain_name", "table_of", "written_text"]
 
 _NUMBERS = {*fields.FLOATS, *fields.INTEGERS} - {"byte"}
 
@@ -83,27 +79,27 @@ class Context:
         """A function that computes a value as it stands in the document."""
         return lambda: resolve(written, self.read)
 
-    def condition(self, written: object, root: Root = None) -> Callable[[Any], bool] | None:
-        """A condition over a bare root as a function of it."""
+    def condition(self, written: object, names: Names) -> Formula | None:
+        """A condition over a result as a function of that."""
         if not isinstance(written, Computed):
             return None
-        return Condition(written.expression, root, self.read)
+        return Formula(written.expression, names, self.read)
 
     def saved(
-        self, written: object, root: Root, cls: type | None = None
+        self, written: object, names: Names, cls: type | None = None
     ) -> dict[str, Callable[[Any], object]]:
-        """What `save` keeps, by the variable's name, as functions of a bare root.
+        """What `save` keeps, by the blackboard's key, as functions of a result.
 
         They raise ValueError for what has no value, or does not fit its variable. `cls` is the
-        message that the root is, where that is known.
+        message that the result is, where that is known.
         """
         return {
-            name: Part(
+            self.scope.key(name): Formula(
                 place.expression,
-                root,
-                self,
-                name,
-                _numbers(place.expression, root, cls, self._declared(name)),
+                names,
+                self.read,
+                partial(self.fitting, name),
+                _numbers(place.expression, cls, self._declared(name)),
             )
             for name, place in table_of(written).items()
         }
@@ -120,58 +116,16 @@ class Context:
         return lambda: written.expression.holds({}, self.read)
 
 
-@dataclass(slots=True, eq=False)
-class Condition:
-    """An expression as a function of its bare root; `text` says what was expected."""
-
-    expression: Expression
-    root: Root
-    read: Callable[[str], object]
-
-    @property
-    def text(self) -> str:
-        """The condition as it was written."""
-        return self.expression.text
-
-    def __call__(self, given: Any) -> bool:
-        """Whether it holds; raises ExpressionError."""
-        return self.expression.holds(_roots(self.root, given), self.read)
-
-
-@dataclass(slots=True, eq=False)
-class Part:
-    """What is kept of a result or a message, as a function of it; `text` says what that is."""
-
-    expression: Expression
-    root: Root
-    context: Context
-    name: str
-    get: Callable[[Any], object] | None
-    """What gets a field of numbers that needs no look."""
-
-    @property
-    def text(self) -> str:
-        """The expression as it was written."""
-        return self.expression.text
-
-    def __call__(self, given: Any) -> object:
-        """The value as its variable wants it; raises ValueError."""
-        if self.get is not None:
-            return self.get(given)
-        value = self.expression.evaluate(_roots(self.root, given), self.context.read)
-        return self.context.fitting(self.name, value)
-
-
 @lru_cache(maxsize=1024)
 def _numbers(
-    expression: Expression, root: Root, cls: type | None, declared: str | None
+    expression: Expression, cls: type | None, declared: str | None
 ) -> Callable[[Any], object] | None:
     """What gets a field of numbers that is of its variable's type as it is; None for any other."""
     path, node = list[str](), expression.tree
     while isinstance(node, ast.Attribute):
         path.insert(0, node.attr)
         node = node.value
-    if cls is None or not path or not isinstance(node, ast.Name) or node.id != root:
+    if cls is None or not path or not isinstance(node, ast.Name) or node.id != "result":
         return None
     kind: fields.FieldType | None = fields.Message(cls)
     for part in path:
@@ -184,12 +138,6 @@ def _numbers(
         return None
     fits = declared is None or parse_type(declared) == kind
     return attrgetter(".".join(path)) if fits else None
-
-
-def _roots(root: Root, given: Any) -> Mapping[str, object]:
-    if callable(root):
-        return root(given)
-    return {} if root is None else {root: given}
 
 
 def table_of(value: object) -> dict[str, Any]:

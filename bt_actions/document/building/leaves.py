@@ -12,10 +12,11 @@ from py_trees.behaviours import Failure, Running, Success
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.leaves import Check, Log, SetValues, Wait, WaitUntil
+from bt_actions.behaviours.reading import Names, Reading, of_result
 from bt_actions.behaviours.run_tree import CANCEL, RunTree, roots_of
 from bt_actions.behaviours.service import CallService
 from bt_actions.behaviours.topics import Publish, WaitForMessage
-from bt_actions.document.building.context import Context, Root, plain_name, table_of, written_text
+from bt_actions.document.building.context import Context, plain_name, table_of, written_text
 from bt_actions.document.language.classes import ClassError, make_behaviour, refusal
 from bt_actions.document.language.values import Computed, computed_in, spoken
 from bt_actions.document.reading.settings import server_of, settings_of, text_of
@@ -36,7 +37,7 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
         terms = {
             "action_type": _interface(settings["type"], "action", context),
             "action_name": context.name(settings, "server"),
-            **_terms(settings, context, "result"),
+            **_terms(settings, context, of_result),
         }
         if not says_more:
             context.terms[node.alias] = terms
@@ -45,7 +46,7 @@ def build_action(node: TreeNode, context: Context) -> Behaviour:
     return ActionBehaviour(
         node.name,
         goal=context.value(goal) if computed_in(goal) else goal,
-        save=_save(settings, context, "result", result),
+        save=context.saved(settings.get("save"), of_result, result),
         **terms,
     )
 
@@ -57,7 +58,7 @@ def _run_tree(node: TreeNode, context: Context) -> Behaviour:
         context.value(settings["tree"]),
         context.value(settings.get("inputs", {})),
         server=context.joined(settings, server_of(settings)),
-        save=_save(settings, context, roots_of),
+        save=context.saved(settings.get("save"), roots_of),
         **_terms(settings, context, roots_of, {"cancel": CANCEL}),
     )
 
@@ -65,7 +66,7 @@ def _run_tree(node: TreeNode, context: Context) -> Behaviour:
 def _terms(
     settings: Mapping[str, object],
     context: Context,
-    root: Root,
+    names: Names,
     timeout: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """What a goal is sent and judged by, whatever it says; `timeout` where nothing else is said."""
@@ -74,18 +75,10 @@ def _terms(
     return {
         "timeout": _timeouts(tuple({**timeout, **table_of(settings.get("timeout"))}.items())),
         "retry": _retry(settings, context),
-        "expect": context.condition(settings.get("expect"), root),
+        "expect": context.condition(settings.get("expect"), names),
         "busy": Busy(text_of(settings, "busy") or "wait"),
         "resources": [context.joined(settings, str(each)) for each in resources],
     }
-
-
-def _save(
-    settings: Mapping[str, object], context: Context, root: Root, result: type | None = None
-) -> dict[str, Any]:
-    """What is kept of a result, by the blackboard's key."""
-    saved = context.saved(settings.get("save"), root, result)
-    return {context.scope.key(name): part for name, part in saved.items()}
 
 
 @lru_cache(maxsize=1024)
@@ -99,7 +92,7 @@ def _retry(settings: Mapping[str, object], context: Context) -> Retry:
     if "outcomes" in fields:
         fields["outcomes"] = frozenset(fields["outcomes"])
     if "when" in fields:  # reads the variables of one tree, so that no other can share it
-        fields["when"] = context.condition(fields["when"], "result")
+        fields["when"] = context.condition(fields["when"], of_result)
         return Retry(**fields)
     return _plain_retry(tuple(fields.items()))
 
@@ -121,21 +114,13 @@ def _check(node: TreeNode, context: Context) -> Behaviour:
 
 
 def _reader(
-    node: TreeNode, context: Context, root: str, condition: str, unmet: str
-) -> Callable[[Any], None]:
-    """What judges an answer or a message, and keeps parts of it, as `save` says.
-
-    It raises ValueError, with `unmet` where the condition does not hold.
-    """
-    holds = context.condition(node.values.get(condition), root)
-    saved = context.saved(node.values.get("save"), root)
-
-    def read(given: Any) -> None:
-        if holds is not None and not holds(given):
-            raise ValueError(unmet)
-        context.scope.write_all({name: part(given) for name, part in saved.items()})
-
-    return read
+    values: Mapping[str, object], context: Context, condition: str, what: str, names: Names
+) -> Callable[[Any], str]:
+    """What judges an answer or a message, and keeps parts of it, as `save` says."""
+    expect = context.condition(values.get(condition), names)
+    reading = Reading(expect, context.saved(values.get("save"), names), what=what)
+    reading.set_up(None)
+    return reading.read
 
 
 def _service(node: TreeNode, context: Context) -> Behaviour:
@@ -149,7 +134,7 @@ def _service(node: TreeNode, context: Context) -> Behaviour:
         server=timeout.get("server", 5.0),
         response=timeout.get("response", 5.0),
         retry=_retry(values, context),
-        read=_reader(node, context, "result", "expect", "the answer is not what was expected"),
+        read=_reader(values, context, "expect", "answer", of_result),
     )
 
 
@@ -177,9 +162,7 @@ def _wait_for_message(node: TreeNode, context: Context) -> Behaviour:
         context.name(values, "topic"),
         qos=text_of(values, "qos") or "default",
         timeout=timeout,
-        read=_reader(
-            node, context, "message", "until", "a message came, but not the one waited for"
-        ),
+        read=_reader(values, context, "until", "message", lambda message: {"message": message}),
     )
 
 
