@@ -22,7 +22,7 @@ from bt_actions.document.language.shape import (
 )
 from bt_actions.document.language.types import meant_type
 from bt_actions.document.language.values import BAD, Computed, read_expression, read_value
-from bt_actions.document.yaml.cut import warn_cut, warn_quotes
+from bt_actions.document.yaml.mistaken import warn_cut, warn_quotes
 from bt_actions.document.yaml.nodes import NULLS, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source, spoken
 from bt_actions.utilities.suggest import did_you_mean

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from bt_actions.document.findings.elsewhere import notation_here
 from bt_actions.document.language.values import BAD, Computed, read_value
-from bt_actions.document.yaml.braces import report_braces
+from bt_actions.document.yaml.mistaken import report_braces
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 

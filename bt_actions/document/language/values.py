@@ -17,10 +17,9 @@ from typing import Final
 from bt_actions.document.findings import DocumentError, Span
 from bt_actions.document.findings.elsewhere import notation_here
 from bt_actions.document.language.bounds import MAX_ITEMS, refuse_large
-from bt_actions.document.yaml.braces import report_braces
 from bt_actions.document.yaml.compose import compose
-from bt_actions.document.yaml.cut import cut_hint, warn_cut, warn_quotes
 from bt_actions.document.yaml.inner import inner_span
+from bt_actions.document.yaml.mistaken import cut_hint, report_braces, warn_cut, warn_quotes
 from bt_actions.document.yaml.nodes import (
     Listing,
     Mapping,

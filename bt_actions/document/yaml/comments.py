@@ -7,14 +7,16 @@ no scalar.
 from __future__ import annotations
 
 import re
+from bisect import bisect
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["Comment", "block_header", "comments_of", "scalars_of"]
+__all__ = ["Comment", "block_header", "comments_of", "content_of", "scalars_of"]
 
+_LATER = (float("inf"), 0.0)
 _PROPERTY = re.compile(r"[&!]\S*\s+")
 
 
@@ -46,56 +48,39 @@ def scalars_of(root: Node) -> Iterator[Scalar]:
                 stack += [key, value]
 
 
-def block_header(scalar: Scalar, source: Source) -> str:
-    """``|`` or ``>-`` and the like, where a scalar is a block; else nothing."""
-    if scalar.plain:
-        return ""
+def content_of(scalar: Scalar, source: Source) -> str:
+    """What is written on the first line of a scalar, behind its anchor and its tag."""
     written = (source.line(scalar.line) or "")[scalar.column - 1 :]
     while (match := _PROPERTY.match(written)) is not None:
         written = written[match.end() :]
-    if written[:1] not in ("|", ">"):
-        return ""
-    return written.split(" ")[0].split("\t")[0]
+    return written
+
+
+def block_header(scalar: Scalar, source: Source) -> str:
+    """``|`` or ``>-`` and the like, where a scalar is a block; else nothing."""
+    written = "" if scalar.plain else content_of(scalar, source)
+    return written.split(" ")[0].split("\t")[0] if written[:1] in ("|", ">") else ""
 
 
 def comments_of(source: Source, scalars: Iterable[Scalar]) -> Iterator[Comment]:
     """The comments of a text, in its order, given all of its scalars."""
-    marked = {number for number, line in enumerate(source.lines, 1) if "#" in line}
-    texts: dict[int, list[tuple[int, float]]] = {}
-    for scalar in scalars:
-        if marked.isdisjoint(range(scalar.line, scalar.end_line + 1)):
-            continue
-        for number, start, end in _parts(scalar, source):
-            if number in marked:
-                texts.setdefault(number, []).append((start, end))
-    for number in sorted(marked):
+    lines = source.commented
+    texts = sorted(
+        _range(scalar, source)
+        for scalar in scalars
+        if not lines.isdisjoint(range(scalar.line, scalar.end_line + 1))
+    )
+    for number in sorted(lines):
         line = source.lines[number - 1]
-        at = _first_outside(line, texts.get(number, ()))
-        if at >= 0:
-            yield Comment(number, at + 1, line[at:].rstrip(), not line[:at].strip())
+        for at in (at for at, char in enumerate(line, 1) if char == "#"):
+            before = bisect(texts, ((number, at), _LATER))
+            if not before or texts[before - 1][1] <= (number, at):
+                yield Comment(number, at, line[at - 1 :].rstrip(), not line[: at - 1].strip())
+                break
 
 
-def _parts(scalar: Scalar, source: Source) -> Iterator[tuple[int, int, float]]:
-    """The part of each line that belongs to a scalar, as columns from 0; the end is outside."""
-    first, last = scalar.line, scalar.end_line
-    if first == last:
-        yield first, scalar.column - 1, scalar.end_column - 1
-        return
-    header = block_header(scalar, source)
-    if header:
-        at = (source.line(first) or "").find(header, scalar.column - 1)
-        yield first, scalar.column - 1, at + len(header)
-    else:
-        yield first, scalar.column - 1, float("inf")
-    for line in range(first + 1, last):
-        yield line, 0, float("inf")
-    if scalar.end_column > 1:
-        yield last, 0, float("inf") if header else scalar.end_column - 1
-
-
-def _first_outside(line: str, texts: Iterable[tuple[int, float]]) -> int:
-    """Where the first '#' stands that is in none of the ranges, or -1."""
-    at = line.find("#")
-    while at >= 0 and any(start <= at < end for start, end in texts):
-        at = line.find("#", at + 1)
-    return at
+def _range(scalar: Scalar, source: Source) -> tuple[tuple[int, int], tuple[float, float]]:
+    """Where a scalar begins and ends; behind the header of a block a comment may stand."""
+    is_block = block_header(scalar, source) != ""
+    begin = (scalar.line + 1, 0) if is_block else (scalar.line, scalar.column)
+    return begin, (scalar.end_line, scalar.end_column)

@@ -1,16 +1,14 @@
 """Where the characters of a scalar's text are written, so that a part of it can be pointed at.
 
-Decodes what was written once more and compares it with libyaml's text: where the two differ, the
-whole scalar is the answer.
+Looks for libyaml's text in what was written: where it is not found, the whole scalar is the answer.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 
 from bt_actions.document.findings import Span
-from bt_actions.document.yaml.comments import block_header
+from bt_actions.document.yaml.comments import block_header, content_of
 from bt_actions.document.yaml.nodes import Scalar, span_of
 from bt_actions.document.yaml.source import Char, Source
 
@@ -42,72 +40,43 @@ def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
 def _decoded(node: Scalar, source: Source) -> list[Char]:
     """The characters of a text as they are written, or none where that cannot be told."""
     if source.decoded is None or source.decoded[0] is not node:
-        chars = _written(node, source)
-        text = "".join(char for char, _, _ in chars)
-        same = text.rstrip("\n ") == node.text.rstrip("\n ")
-        source.decoded = (node, chars if same else [])
+        source.decoded = node, _found(node, source)
     return source.decoded[1]
 
 
-def _written(node: Scalar, source: Source) -> list[Char]:
-    """The characters of a text as they are written; wrong, or none, for forms not known here."""
-    lines = range(node.line, node.end_line + (node.end_column > 1))
-    written = [(number, source.line(number) or "") for number in lines]
-    header = block_header(node, source)
-    if header:
-        return list(_block(written[1:], folded=header[0] == ">"))
-    first, text = written[0]
-    if node.plain or len(written) > 1:
-        if not node.plain:
-            return []
-        return list(_folded(written, node.column, node.end_column))
-    quote = text[node.column - 1 : node.column]
-    inside = text[node.column : node.end_column - 2]
-    if quote == "'":
-        return list(_single(inside, first, node.column + 1))
-    return list(_double(inside, first, node.column + 1)) if quote == '"' else []
+def _found(node: Scalar, source: Source) -> list[Char]:
+    """The characters of a text, looked for one after the other in what was written.
 
-
-def _folded(written: list[tuple[int, str]], column: int, end_column: int) -> Iterator[Char]:
-    """A plain text; its line breaks are spaces."""
-    for at, (number, line) in enumerate(written):
-        begin = column - 1 if at == 0 else len(line) - len(line.lstrip())
-        stop = end_column - 1 if at == len(written) - 1 else len(line.rstrip())
-        if at:
-            yield " ", number, begin + 1
-        for place in range(begin, min(stop, len(line))):  # a value of --set has no line
-            yield line[place], number, place + 1
-
-
-def _block(written: list[tuple[int, str]], *, folded: bool) -> Iterator[Char]:
-    """A block text, with the indentation of its first line."""
-    first = next((line for _, line in written if line.strip()), "")
-    indent = len(first) - len(first.lstrip(" "))
-    for number, line in written:
-        for place in range(indent, len(line)):
-            yield line[place], number, place + 1
-        yield " " if folded else "\n", number, max(len(line), indent) + 1
-
-
-def _single(inside: str, line: int, column: int) -> Iterator[Char]:
-    at = 0
-    while at < len(inside):
-        yield inside[at], line, column + at
-        at += 2 if inside.startswith("''", at) else 1
-
-
-def _double(inside: str, line: int, column: int) -> Iterator[Char]:
-    at = 0
-    while at < len(inside):
-        match = _ESCAPE.match(inside, at)
-        if match is None:
-            yield inside[at], line, column + at
-            at += 1
-            continue
-        if match[1]:
-            char = bytes.fromhex(match[1] + match[2]).decode("utf-16-be")
+    What is passed over is indentation, the second of two quotes, and whatever else says nothing. A
+    line break may stand for a space.
+    """
+    found: list[Char] = []
+    content = content_of(node, source)
+    line, at = node.line, len(source.line(node.line) or "") - len(content)
+    if block_header(node, source):
+        line, at = line + 1, 0
+    elif content[:1] in ("'", '"'):
+        at += 1
+    escapes = content.startswith('"')
+    for char in node.text:
+        while line <= node.end_line:
+            written = source.line(line) or ""
+            escape = _ESCAPE.match(written, at) if escapes else None
+            there = _said(escape) if escape else (written[at : at + 1] or "\n")
+            found.append((char, line, at + 1))
+            at = escape.end() if escape else at + 1
+            if at > len(written):
+                line, at = line + 1, 0
+            if there == char or (there == "\n" and char == " "):
+                break
+            found.pop()
         else:
-            code = match[3] or match[4] or match[5]
-            char = chr(int(code, 16)) if code else _SHORT.get(match[6], "\0")
-        yield char, line, column + at
-        at = match.end()
+            return [] if node.text[len(found) :].strip("\n ") else found
+    return found
+
+
+def _said(escape: re.Match[str]) -> str:
+    if escape[1]:
+        return bytes.fromhex(escape[1] + escape[2]).decode("utf-16-be")
+    code = escape[3] or escape[4] or escape[5]
+    return chr(int(code, 16)) if code else _SHORT.get(escape[6], "")

@@ -1,16 +1,17 @@
-"""A plain text that is not what it looks like: cut by a '#', or in quotes that YAML does not know.
+"""What YAML reads in another way than it looks.
 
 ``Part #3`` is the text ``Part`` and a comment; where a space follows the '#' a comment was meant,
-nobody can tell more. In ``“map”`` the quotes are a part of the text.
+nobody can tell more. In ``“map”`` the quotes are a part of the text. ``{x}`` is a mapping of x to
+nothing, where a variable or a word was meant.
 """
 
 from __future__ import annotations
 
 from bt_actions.document.findings import Span
-from bt_actions.document.yaml.nodes import Scalar, span_of
+from bt_actions.document.yaml.nodes import Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source, unquoted
 
-__all__ = ["cut_hint", "warn_cut", "warn_quotes"]
+__all__ = ["cut_hint", "report_braces", "warn_cut", "warn_quotes"]
 
 
 def warn_cut(node: Scalar, source: Source, what: str) -> None:
@@ -51,3 +52,15 @@ def _behind(node: Scalar, source: Source) -> str:
     if not node.plain or node.end_line not in source.commented:
         return ""
     return (source.line(node.end_line) or "")[node.end_column - 1 :]
+
+
+def report_braces(node: Node, source: Source) -> bool:
+    """Report `{x}` where no mapping is meant."""
+    if not isinstance(node, Mapping) or not node.flow or len(node.pairs) != 1:
+        return False
+    key, value = node.pairs[0]
+    if not isinstance(value, Scalar) or value.text or not value.plain:
+        return False
+    hint = f"leave the braces away, or write ${key.text} for a variable"
+    source.report("BT117", span_of(node), f"{{{key.text}}} is read as a mapping", hint=hint)
+    return True
