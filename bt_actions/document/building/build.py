@@ -20,7 +20,7 @@ from bt_actions.behaviours.leaves import WaitUntil
 from bt_actions.behaviours.parallel import Parallel
 from bt_actions.behaviours.topics import TopicValue, patient
 from bt_actions.document.building.context import Context, plain_name, table_of, written_text
-from bt_actions.document.building.leaves import LEAVES, build_action
+from bt_actions.document.building.leaves import LEAVES
 from bt_actions.document.building.scope import Scope
 from bt_actions.document.findings import NODE
 from bt_actions.document.language.bounds import refuse_large
@@ -91,11 +91,7 @@ def _connect(root: Behaviour, topics: list[TopicValue]) -> None:
 
 
 def _node(node: TreeNode, context: Context) -> Behaviour:
-    if node.alias is not None:
-        behaviour = build_action(node, context)
-    else:
-        assert node.kind is not None
-        behaviour = BUILDERS[node.kind.name](node, context)
+    behaviour = BUILDERS[node.kind.name](node, context)
     if context.topics and not isinstance(behaviour, WaitUntil):  # which waits anyway
         written = settings_of(node, context.document) if node.is_action else node.values
         names = {name for each in computed_in(written) for name in each.expression.names}
@@ -187,7 +183,7 @@ def _subtree(node: TreeNode, context: Context) -> Behaviour:
     written = {declared.name for declared in included.outputs.values()}
     written |= _writes(included, included.nodes())
     for inner in included.nodes():
-        if inner.kind is not None and inner.kind.name == "run_once":
+        if inner.kind.name == "run_once":
             written -= _writes(included, inner.walk())  # which is not done again
 
     def begin() -> None:

@@ -25,10 +25,10 @@ from bt_actions.document.yaml.nodes import span_of
 from bt_actions.goals.policy import Busy, Retry, Timeouts
 from bt_actions.messages.interfaces import interface
 
-__all__ = ["LEAVES", "build_action"]
+__all__ = ["LEAVES"]
 
 
-def build_action(node: TreeNode, context: Context) -> Behaviour:
+def _action(node: TreeNode, context: Context) -> Behaviour:
     """The behaviour of an action, by its name in the document or in place."""
     settings = settings_of(node, context.document)
     says_more = len(node.values) - ("goal" in node.values) - ("save" in node.values) > 1
@@ -216,7 +216,7 @@ def _plain(
 
 LEAVES: Mapping[str, Callable[[TreeNode, Context], Behaviour]] = MappingProxyType(
     {
-        "action": build_action,
+        "action": _action,
         "run_tree": _run_tree,
         "service": _service,
         "publish": _publish,

@@ -36,11 +36,11 @@ def check_actions(checker: Checker) -> None:
         checker.reader = declared
         if declared.source is checker.source:
             cls = checker.action_class(declared)
-            checker.call(declared.values, declared.parts, cls, "action")
+            checker.call(declared.values, declared.parts, cls)
             continue
         values = _left(declared.values, users.get(declared.name, []))
         with _within(checker, declared.source, f"the imported action {declared.name!r}"):
-            checker.call(values, declared.parts, checker.action_class(declared), "action")
+            checker.call(values, declared.parts, checker.action_class(declared))
 
 
 def check_defaults(checker: Checker) -> None:
@@ -63,7 +63,7 @@ def check_defaults(checker: Checker) -> None:
 
 def check_use(checker: Checker, node: TreeNode, declared: Declared) -> None:
     """Check a node that runs an action, with what it says beside the action's own words."""
-    checker.call(node.values, node.written, checker.action_class(declared), "action")
+    checker.call(node.values, node.written, checker.action_class(declared))
     _check_together(checker, node, declared)
 
 

@@ -29,5 +29,5 @@ def _check_node(checker: Checker, node: TreeNode) -> None:
         declared = checker.document.actions.get(node.alias)
         if declared is not None:
             check_use(checker, node, declared)
-    elif node.kind is not None and node.kind.name in CHECKS:
+    elif node.kind.name in CHECKS:
         CHECKS[node.kind.name](checker, node)

@@ -19,6 +19,7 @@ from bt_actions.document.checking.variables import infer_variables, items_inside
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
 from bt_actions.document.language.bare import warn_bare_angle, warn_bare_duration
+from bt_actions.document.language.kinds import KINDS, Interface, Kind
 from bt_actions.document.language.types import Either, TypeNameError, fits, interface_of, misfits
 from bt_actions.document.language.values import (
     BAD,
@@ -49,16 +50,14 @@ __all__ = ["Checker"]
 
 
 Types = MappingType[str, FieldType | None]
-_PARTS = {"action": ("goal", "Goal", "Result"), "srv": ("request", "Request", "Response")}
 
 
 @lru_cache(maxsize=1024)
-def _parts(cls: type | None, kind: str) -> tuple[str, FieldType | None, Types]:
-    """The key and the type of what is sent, and the root of expressions over what comes back."""
-    key, asked, answered = _PARTS[kind]
+def _parts(cls: type | None, interface: Interface) -> tuple[FieldType | None, Types]:
+    """The type of what is sent, and the root of expressions over what comes back."""
     if cls is None:
-        return key, None, {"result": None}
-    return key, Message(getattr(cls, asked)), {"result": Message(getattr(cls, answered))}
+        return None, {interface.root: None}
+    return Message(interface.sent_by(cls)), {interface.root: Message(interface.received_from(cls))}
 
 
 def _all_computed(
@@ -176,10 +175,12 @@ class Checker:
         values: MappingType[str, object],
         written: MappingType[str, Node],
         cls: type | None,
-        kind: str,
+        kind: Kind = KINDS["action"],
     ) -> None:
         """Check what an action and a service have in common."""
-        key, asked, roots = _parts(cls, kind)
+        assert kind.interface is not None
+        key = kind.interface.fields
+        asked, roots = _parts(cls, kind.interface)
         if key in values and key in written:
             self.value(asked, values[key], written[key])
         self.condition(values.get("expect"), roots)

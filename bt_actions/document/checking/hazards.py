@@ -67,7 +67,7 @@ class _Hazards:
         stack = [(root, bounded, loops)]
         while stack:
             node, inside, around = stack.pop()
-            kind = node.kind.name if node.kind is not None else ""
+            kind = node.kind.name
             if node.alias is not None:
                 self._used.add(node.alias)
             if node.is_action and not inside:
@@ -186,10 +186,10 @@ class _Hazards:
         while stack and found is None:
             node = stack.pop()
             inner = node.included.root if node.included is not None else None
-            anew = node.is_action or (node.kind is not None and node.kind.name in BEGUN)
+            anew = node.is_action or node.kind.name in BEGUN
             if anew or (inner is not None and self._restarted(inner)):
                 found = node
-            elif node.kind is None or node.kind.name != "run_once":
+            elif node.kind.name != "run_once":
                 stack.extend(reversed(node.children))
         self._anew[id(root)] = found
         return found
@@ -200,7 +200,7 @@ class _Hazards:
         if found is None:
             below = node.included.root if node.included is not None else None
             within = [*node.children, below] if below is not None else node.children
-            busy = node.is_action or (node.kind is not None and node.kind.name in _BUSY)
+            busy = node.is_action or node.kind.name in _BUSY
             busy = busy or "subscribers" in node.values  # of a publish, which waits for them
             found = busy or any(self._takes_time(each) for each in within)
             self._slow[id(node)] = found
@@ -223,7 +223,7 @@ class _Hazards:
     def _inverted(self, node: TreeNode) -> None:
         """A check fails where nothing has come on its topic; that is a success here."""
         asked = [inner for child in node.children for inner in child.walk()]
-        kinds = {inner.kind.name if inner.kind is not None else "" for inner in asked}
+        kinds = {inner.kind.name for inner in asked}
         if not kinds <= {"sequence", "fallback", "check"}:
             return
         reads = (read for inner in asked for read in self._checker.reads.get(id(inner), ()))

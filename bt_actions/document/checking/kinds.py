@@ -166,15 +166,15 @@ def _for_each(checker: Checker, node: TreeNode) -> None:
         checker.value(None, items, node.written["in"], prose=True)
 
 
-def _interface(checker: Checker, node: TreeNode, kind: str) -> type | None:
-    name = node.values.get("type")
-    return checker.interface(name, kind, node.written["type"]) if isinstance(name, str) else None
+def _interface(checker: Checker, node: TreeNode) -> type | None:
+    name, interface = node.values.get("type"), node.kind.interface
+    if interface is None or not isinstance(name, str):
+        return None
+    return checker.interface(name, interface.kind, node.written["type"])
 
 
-def _call_of(kind: str) -> Callable[[Checker, TreeNode], None]:
-    return lambda checker, node: checker.call(
-        node.values, node.written, _interface(checker, node, kind), kind
-    )
+def _call(checker: Checker, node: TreeNode) -> None:
+    checker.call(node.values, node.written, _interface(checker, node), node.kind)
 
 
 def _run_tree(checker: Checker, node: TreeNode) -> None:
@@ -193,7 +193,7 @@ def _run_tree(checker: Checker, node: TreeNode) -> None:
 
 
 def _publish(checker: Checker, node: TreeNode) -> None:
-    cls = _interface(checker, node, "msg")
+    cls = _interface(checker, node)
     if "message" in node.values:
         kind = None if cls is None else Message(cls)
         checker.value(kind, node.values["message"], node.written["message"])
@@ -206,7 +206,7 @@ def _publish(checker: Checker, node: TreeNode) -> None:
 
 
 def _wait_for_message(checker: Checker, node: TreeNode) -> None:
-    cls = _interface(checker, node, "msg")
+    cls = _interface(checker, node)
     roots = {"message": None if cls is None else Message(cls)}
     checker.condition(node.values.get("until"), roots)
     checker.save(node.values.get("save"), roots)
@@ -278,7 +278,7 @@ def _python(checker: Checker, node: TreeNode) -> None:
 
 CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
     {
-        "action": _call_of("action"),
+        "action": _call,
         "check": _condition_of("check"),
         "for_each": _for_each,
         "log": _log,
@@ -288,7 +288,7 @@ CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
         "repeat": _number_of("times", INTEGER),
         "retry": _number_of("attempts", INTEGER, 1),
         "run_tree": _run_tree,
-        "service": _call_of("srv"),
+        "service": _call,
         "set": _set,
         "subtree": _subtree,
         "timeout": _number_of("after", FLOAT, zero=False),

@@ -21,13 +21,6 @@ from bt_actions.document.yaml.nodes import span_of
 
 __all__ = ["find_missing"]
 
-_READ_FIRST = {
-    "action": "goal", "run_tree": "inputs", "service": "request", "publish": "message",
-    "set": "set", "wait": "wait", "check": "check", "while": "while", "subtree": "with",
-    "for_each": "in", "repeat": "times", "retry": "attempts", "timeout": "after",
-    "wait_until": "wait_until",
-}  # fmt: skip
-"""What a kind of node computes before it does anything, and fails without."""
 _ASKS = frozenset({"check", "while"})
 _AT_ONCE = _ASKS | {"set", "publish"}
 """Kinds that fail for a missing value, and for hardly anything else."""
@@ -48,7 +41,7 @@ class _Need(NamedTuple):
 
     @property
     def asks(self) -> bool:
-        return _kind(self.node) in _ASKS
+        return self.node.kind.name in _ASKS
 
 
 _Needs = tuple[tuple[_Need, ...], frozenset[str]]
@@ -57,7 +50,7 @@ _Needs = tuple[tuple[_Need, ...], frozenset[str]]
 
 def find_missing(checker: Checker, doubts: Doubts, root: TreeNode) -> None:
     """Report the reads in later children of fallbacks that fail for what an earlier one lacked."""
-    if any(_kind(node) == "fallback" for node in checker.document.nodes()):
+    if any(node.kind.name == "fallback" for node in checker.document.nodes()):
         _Missing(checker, doubts).visit(root)
 
 
@@ -73,13 +66,13 @@ class _Missing:
 
     def visit(self, node: TreeNode) -> None:
         """Look at a node and what is below it."""
-        if _kind(node) == "fallback" and not self._doubts.below(node):
+        if node.kind.name == "fallback" and not self._doubts.below(node):
             self._look_at(node)
         self._written |= self._writes(node)
         added: set[str] = set()
         for child in node.children:
             self.visit(child)
-            if _kind(node) == "sequence":
+            if node.kind.name == "sequence":
                 given = self._needs(child)[1] - self._there
                 added |= given
                 self._there |= given
@@ -94,13 +87,13 @@ class _Missing:
             last = child is fallback.children[-1]
             for need in needs:
                 first, rescued = lacked.get(need.name, (None, False))
-                if first is None or need.name in settled or _kind(need.node) == "wait_until":
+                if first is None or need.name in settled or need.node.kind.name == "wait_until":
                     continue
                 if not need.asks or (rescued and not asks and last):
                     settled.add(need.name)
                     self._report(need, first)
             for need in needs:
-                if _kind(need.node) in _AT_ONCE or id(need.node) in waits:
+                if need.node.kind.name in _AT_ONCE or id(need.node) in waits:
                     lacked.setdefault(need.name, (need, asks))
             for each in child.walk():
                 settled.update(*(one.expression.asked for one in computed_in(each.values)))
@@ -122,7 +115,7 @@ class _Missing:
     def _work_out(self, node: TreeNode) -> _Needs:
         needs = [*self._own(node)]
         there = {*self._writes(node), *(need.name for need in needs)}
-        kind = _kind(node)
+        kind = node.kind.name
         if kind in ("check", "wait_until"):
             there.update(*(one.expression.names for one in computed_in(node.values.get(kind))))
         inner = [self._needs(child) for child in node.children]
@@ -138,9 +131,8 @@ class _Missing:
         return tuple(needs), frozenset(there)
 
     def _own(self, node: TreeNode) -> Iterator[_Need]:
-        key = _READ_FIRST.get(_kind(node), "")
         values = settings_of(node, self._checker.document) if node.is_action else node.values
-        for computed in computed_in(values.get(key)):
+        for computed in computed_in(values.get(node.kind.reads)):
             for name in dict.fromkeys(computed.expression.variables):
                 if name not in computed.expression.asked:
                     yield _Need(name, node, computed)
@@ -161,22 +153,18 @@ class _Missing:
         )  # fmt: skip
 
 
-def _kind(node: TreeNode) -> str:
-    return "action" if node.kind is None else node.kind.name
-
-
 def _ended_waits(branch: TreeNode) -> set[int]:
     """Return the ids of the nodes that wait until a condition holds, or a timeout ends them."""
     found: set[int] = set()
     waiting = [(branch, False)]
     while waiting:
         node, ends = waiting.pop()
-        ends = ends or _kind(node) == "timeout"
-        if _kind(node) == "wait_until" and (ends or "timeout" in node.values):
+        ends = ends or node.kind.name == "timeout"
+        if node.kind.name == "wait_until" and (ends or "timeout" in node.values):
             found.add(id(node))
         waiting += [(child, ends) for child in node.children]
     return found
 
 
 def _only_asks(node: TreeNode) -> bool:
-    return {_kind(each) for each in node.walk()} <= _CONDITIONS
+    return {each.kind.name for each in node.walk()} <= _CONDITIONS

@@ -79,7 +79,7 @@ class _Order:
             self._passed |= own
         elif not node.children:
             return _SILENT
-        kind = node.kind.name if node.kind is not None else ""
+        kind = node.kind.name
         if not node.children:
             return own, own if kind == "subtree" else _NOTHING
         if kind == "repeat":  # a read in its first round has nothing yet

@@ -47,7 +47,7 @@ class Known(Protocol):
 
 def type_of(write: Write, known: Known) -> FieldType | None:
     """The type of what is written, without reporting anything."""
-    if write.node.kind is not None and write.node.kind.name == "subtree":
+    if write.node.kind.name == "subtree":
         return _output_type(write, known)
     if write.root == "item of":
         return _item_type(write, known)
@@ -140,21 +140,14 @@ def root_type(node: TreeNode, root: str, known: Known) -> FieldType | None:
     """The type of the bare root that a node's expressions may use."""
     if not known.types:
         return None
+    interface, cls = node.kind.interface, None
+    if interface is None or interface.root != root:
+        return None
     if node.alias is not None:
         declared = known.document.actions.get(node.alias)
         cls = known.action_class(declared) if declared is not None else None
-        return None if cls is None else Message(cls.Result)  # type: ignore[attr-defined]
-    if node.kind is None or node.kind.name not in _ANSWERS:
-        return None
-    kind, part = _ANSWERS[node.kind.name]
-    name = RUN_TREE if node.kind.name == "run_tree" else node.values.get("type")
-    if not isinstance(name, str):
-        return None
-    cls = known.interface(name, kind, node.written.get("type", node.key))
-    if cls is None:
-        return None
-    return Message(getattr(cls, part) if part else cls)
-
-
-_ANSWERS = {"action": ("action", "Result"), "run_tree": ("action", "Result"),
-            "service": ("srv", "Response"), "wait_for_message": ("msg", "")}  # fmt: skip
+    else:
+        name = RUN_TREE if node.kind.name == "run_tree" else node.values.get("type")
+        if isinstance(name, str):
+            cls = known.interface(name, interface.kind, node.written.get("type", node.key))
+    return None if cls is None else Message(interface.received_from(cls))

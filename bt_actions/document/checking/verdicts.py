@@ -41,7 +41,7 @@ class Verdicts:
 
     def of(self, node: TreeNode) -> Can:
         """How a node can end."""
-        kind = node.kind.name if node.kind is not None else "action"
+        kind = node.kind.name
         if kind in _OPEN and not self._at_once:
             return _EITHER
         found = self._known.get(id(node))
@@ -118,7 +118,7 @@ class Verdicts:
         return found
 
     def _add_up(self, node: TreeNode, document: Document) -> float:
-        kind = node.kind.name if node.kind is not None else ""
+        kind = node.kind.name
         if node.is_action:
             settings = settings_of(node, document)
             return _tries(_deadline(settings, "result"), settings.get("retry"))

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 from bt_actions.document.language.keys import (
     ACTION_NAME,
@@ -53,7 +54,10 @@ from bt_actions.document.language.shapes import (
     Values,
 )  # fmt: skip
 
-__all__ = ["KINDS", "SERVICE_TIMEOUT", "Group", "Kind"]
+if TYPE_CHECKING:
+    from bt_actions.messages.interfaces import Kind as InterfaceKind
+
+__all__ = ["KINDS", "SERVICE_TIMEOUT", "Group", "Interface", "Kind"]
 
 _MESSAGE = frozenset({"message"})
 _RUN = frozenset({"result", "outputs"})
@@ -69,8 +73,35 @@ class Group(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Interface:
+    """What a kind talks over: `name` is the key that names the server or the topic.
+
+    `fields` is the key for the fields of what is sent, which are those of the part `sent` of the
+    interface; `root` is what expressions call the part `received`.
+    """
+
+    kind: InterfaceKind
+    name: str
+    fields: str = ""
+    sent: str = ""
+    root: str = ""
+    received: str = ""
+
+    def sent_by(self, cls: Any) -> Any:
+        """The message that is sent, of the interface's class."""
+        return getattr(cls, self.sent) if self.sent else cls
+
+    def received_from(self, cls: Any) -> Any:
+        """The message that comes back."""
+        return getattr(cls, self.received) if self.received else cls
+
+
+@dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of node. `value` is the form of what stands behind the kind's own key."""
+    """A kind of node. `value` is the form of what stands behind the kind's own key.
+
+    `reads` is the key whose value is computed before anything is done; the node fails without it.
+    """
 
     name: str
     group: Group
@@ -78,6 +109,8 @@ class Kind:
     doc: str
     keys: Mapping[str, Key]
     example: str
+    reads: str
+    interface: Interface | None = None
 
     @property
     def named_by_value(self) -> bool:
@@ -113,16 +146,27 @@ _MEMORY = Key(
 
 
 def _composite(name: str, doc: str, example: str, *keys: Key) -> Kind:
-    return Kind(name, Group.COMPOSITE, NodeName(), doc, keyed(_CHILDREN_KEY, *keys), example)
+    return Kind(name, Group.COMPOSITE, NodeName(), doc, keyed(_CHILDREN_KEY, *keys), example, name)
 
 
 def _decorator(name: str, doc: str, example: str, *keys: Key) -> Kind:
-    return Kind(name, Group.DECORATOR, NodeName(), doc, keyed(_CHILD_KEY, *keys), example)
+    reads = keys[0].name if keys else name
+    return Kind(name, Group.DECORATOR, NodeName(), doc, keyed(_CHILD_KEY, *keys), example, reads)
 
 
-def _leaf(name: str, value: Shape, doc: str, example: str, *keys: Key) -> Kind:
-    named = isinstance(value, NodeName)
-    return Kind(name, Group.LEAF, value, doc, keyed(*keys, *(() if named else (_NAME,))), example)
+def _leaf(
+    name: str,
+    value: Shape,
+    doc: str,
+    example: str,
+    *keys: Key,
+    reads: str | None = None,
+    interface: Interface | None = None,
+) -> Kind:
+    all_keys = keyed(*keys, *(() if isinstance(value, NodeName) else (_NAME,)))
+    if reads is None:
+        reads = interface.fields if interface is not None else name
+    return Kind(name, Group.LEAF, value, doc, all_keys, example, reads, interface)
 
 
 def _all() -> Iterable[Kind]:
@@ -148,7 +192,7 @@ def _all() -> Iterable[Kind]:
         "retry",
         "Ticks its child again when it has failed.",
         "retry: Until it holds\nattempts: 3\nbackoff: 500 ms\nchild:\n  success: Grasp",
-        Key("attempts", Whole(1, values=True), "All tries.", default="without limit"),
+        Key("attempts", Whole(1, values=True), "All tries.", default="without limit", example="3"),
         Key("backoff", Duration(zero=True), "The pause before the second try.", default="0 s"),
         Key("factor", Quantity(1.0), "Each pause is this much longer.", default="2"),
         Key("max_backoff", Duration(zero=True), "The longest pause.", default="60 s"),
@@ -157,7 +201,7 @@ def _all() -> Iterable[Kind]:
         "repeat",
         "Ticks its child again when it has succeeded; fails as soon as it fails.",
         "repeat: Three rounds\ntimes: 3\nchild:\n  success: Patrol",
-        Key("times", Whole(0, values=True), "All rounds.", default="for ever"),
+        Key("times", Whole(0, values=True), "All rounds.", default="for ever", example="3"),
     )
     yield _decorator(
         "timeout",
@@ -208,6 +252,7 @@ def _all() -> Iterable[Kind]:
         "fails when it is not.",
         keyed(_CHILD_KEY, _NAME),
         "while: $level > 0.2\nchild:\n  success: Work",
+        "while",
     )
     yield _leaf(
         "action",
@@ -218,6 +263,7 @@ def _all() -> Iterable[Kind]:
         ACTION_TYPE,
         ACTION_NAME,
         *DOING,
+        interface=Interface("action", "server", "goal", "Goal", "result", "Result"),
     )
     yield _leaf(
         "run_tree",
@@ -236,6 +282,8 @@ def _all() -> Iterable[Kind]:
         Key("expect", Condition(_RUN), "What must hold of `result`, or of `outputs`."),
         Key("save", Table(Place(_RUN)), "Names to keep parts of the outputs under."),
         *DOING[-2:],
+        reads="inputs",
+        interface=Interface("action", "server", root="result", received="Result"),
     )  # fmt: skip
     yield _leaf(
         "service",
@@ -263,6 +311,7 @@ def _all() -> Iterable[Kind]:
         Key("expect", Condition(RESULT), "What the answer must be."),
         Key("save", Table(Place(RESULT)), "Names to keep parts of the answer under."),
         Key("namespace", NAMESPACE, "Put before a relative name."),
+        interface=Interface("srv", "server", "request", "Request", "result", "Response"),
     )
     yield _leaf(
         "publish",
@@ -286,6 +335,7 @@ def _all() -> Iterable[Kind]:
         ),
         Key("qos", QOS, "How it is published.", default="default"),
         Key("namespace", NAMESPACE, "Put before a relative name."),
+        interface=Interface("msg", "publish", "message"),
     )
     yield _leaf(
         "wait_for_message",
@@ -300,6 +350,7 @@ def _all() -> Iterable[Kind]:
         Key("save", Table(Place(_MESSAGE)), "Names to keep parts of the message under."),
         Key("qos", QOS, "How the topic is subscribed to.", default="default"),
         Key("namespace", NAMESPACE, "Put before a relative name."),
+        interface=Interface("msg", "topic", root="message"),
     )
     yield _leaf(
         "wait", Duration(zero=True, values=True), "Succeeds after some time.", "wait: 500 ms"
@@ -328,6 +379,7 @@ def _all() -> Iterable[Kind]:
             "How grave it is.",
             default="info",
         ),
+        reads="",  # it never fails
     )
     yield _leaf(
         "python",
@@ -350,6 +402,7 @@ def _all() -> Iterable[Kind]:
         Key("with", Values(), "Values for the tree's inputs."),
         Key("save", Table(Name()), "Names here for the tree's outputs."),
         Key("namespace", NAMESPACE, "Put before all relative names of the tree."),
+        reads="with",
     )
     for name, doc in (
         ("success", "Succeeds at once."),

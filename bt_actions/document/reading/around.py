@@ -7,9 +7,6 @@ from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
 
 __all__ = ["a_kind", "around"]
 
-_SETTINGS = {"retry": ("attempts", "3"), "repeat": ("times", "3"), "timeout": ("after", "30 s"),
-             "for_each": ("in", "[...]")}  # fmt: skip
-"""The key that says how often, or how long, and an example of its value."""
 _LONGEST = 40
 _SIGNS = frozenset(":,{}[]#\n")
 
@@ -20,20 +17,18 @@ def around(written: Mapping, outer: Scalar, inner: Scalar, decorator: str = "") 
     `decorator` is the kind that is meant, where `outer` is one of its keys, or looks like its name.
     """
     decorator = decorator or outer.text
-    keys = KINDS[decorator].keys
+    keys, setting = KINDS[decorator].keys, KINDS[decorator].reads
     said = _text(written.get(decorator))
     if said == "..." and outer.text not in keys:
         said = _text(written.get(outer.text))
     name = _text(written.get(inner.text))
     parts = [f"{decorator}: {said if decorator == 'while' else name}"]
-    if decorator in _SETTINGS:
-        key, example = _SETTINGS[decorator]
-        given = _text(written.get(key))
+    if setting in keys:  # how often, or how long
+        given = _text(written.get(setting))
         if given == "..." and said[:1].isdigit():
             given = said
-        parts.append(f"{key}: {example if given == '...' else given}")
-    first = _SETTINGS.get(decorator, ("",))[0]
-    own = {key: _text(written.get(key)) for key in keys if key != first}
+        parts.append(f"{setting}: {keys[setting].example if given == '...' else given}")
+    own = {key: _text(written.get(key)) for key in keys if key != setting}
     parts += [f"{key}: {given}" for key, given in own.items() if key != "name" and given != "..."]
     parts.append(f"child: {{{inner.text}: {name}, ...}}")
     return f"{a_kind(decorator)} goes around the node: {{{', '.join(parts)}}}"

@@ -4,29 +4,23 @@ from __future__ import annotations
 
 import contextlib
 
+from bt_actions.document.language.kinds import Interface
 from bt_actions.document.language.shape import is_computed
 from bt_actions.document.language.types import interface_of
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, data_of
 from bt_actions.messages.as_fields import as_fields
-from bt_actions.messages.interfaces import Kind
 
-__all__ = ["FIELDS", "fields_for"]
-
-FIELDS: dict[str, tuple[Kind, str]] = {
-    "goal": ("action", "Goal"), "request": ("srv", "Request"), "message": ("msg", ""),
-}  # fmt: skip
-"""Keys for the fields of what a node sends: the kind of its type, and the part that is sent."""
+__all__ = ["fields_for"]
 
 
-def fields_for(key: str, inner: Listing, typed: Node) -> str | None:
-    """Return a hint for a list behind one of `FIELDS`; `typed` holds the type of what is sent."""
+def fields_for(interface: Interface, inner: Listing, typed: Node) -> str | None:
+    """Return a hint for a list in the place of fields; `typed` holds the interface's type."""
     named = typed.get("type") if isinstance(typed, Mapping) else None
     if not isinstance(named, Scalar):
         return None
-    kind, part = FIELDS[key]
     with contextlib.suppress(ValueError):  # TypeNameError is one
-        cls = interface_of(named.text, kind)
+        cls = interface_of(named.text, interface.kind)
         data = [None if is_computed(each) else data_of(each) for each in inner.items]
-        instead = as_fields(getattr(cls, part) if part else cls, data)
+        instead = as_fields(interface.sent_by(cls), data)
         return f"write {instead}" if instead else None
     return None

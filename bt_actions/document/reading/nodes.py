@@ -11,18 +11,17 @@ from itertools import chain
 from bt_actions.document.findings import Place, Related
 from bt_actions.document.findings.elsewhere import key_here, kind_here
 from bt_actions.document.language.keys import ACTION_KEYS
-from bt_actions.document.language.kinds import KINDS, Group, Kind
+from bt_actions.document.language.kinds import KINDS, Group
 from bt_actions.document.language.scalars import Name
 from bt_actions.document.language.shape import words_for, wrong_form
 from bt_actions.document.language.shapes import (
     Key,
     Table,
     report_unknown_key,
-    required_in,
 )
 from bt_actions.document.language.values import BAD
 from bt_actions.document.reading.around import a_kind, around
-from bt_actions.document.reading.listed import FIELDS, fields_for
+from bt_actions.document.reading.listed import fields_for
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of
@@ -30,6 +29,7 @@ from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
 
 __all__ = ["NODE_KEYS", "read_root"]
 
+_ACTION = KINDS["action"]
 _CHILDREN = ("child", "children")
 NODE_KEYS = frozenset(
     {*ACTION_KEYS, *_CHILDREN, *(key for kind in KINDS.values() for key in kind.keys)}
@@ -105,12 +105,12 @@ class _Reader:
             source.unread.nodes.append(written)
             return None
         kind = KINDS.get(key.text)
-        node = TreeNode(kind, key, written, source)
-        if kind is None:
-            node.alias = key.text
-            self._fill(node, ACTION_KEYS, _ACTION_NAME, _ACTION_NEEDS)
+        if kind is not None:
+            node = TreeNode(kind, key, written, source)
+            self._fill(node, kind.keys)
         else:
-            self._fill(node, kind.keys, kind, _NEEDS[kind.name])
+            node = TreeNode(_ACTION, key, written, source, alias=key.text)
+            self._fill(node, ACTION_KEYS)
         return node
 
     def _typed(self, written: Mapping, said: Node) -> bool:
@@ -213,12 +213,11 @@ class _Reader:
         for name in _CHILDREN:
             inner = written.get(name)
             if inner is not None:
-                self._children(TreeNode(None, Scalar(), written, self._source), name, inner)
+                self._children(TreeNode(_ACTION, Scalar(), written, self._source), name, inner)
 
-    def _fill(
-        self, node: TreeNode, keys: MappingType[str, Key], kind: Kind, needs: tuple[Key, ...]
-    ) -> None:
+    def _fill(self, node: TreeNode, keys: MappingType[str, Key]) -> None:
         source, values, written = self._source, node.values, node.written
+        kind, interface = node.kind, node.kind.interface
         unknown = False
         beside: list[tuple[Scalar, Node]] = []
         for key, inner in chain(node.node.pairs, beside):
@@ -227,7 +226,7 @@ class _Reader:
                 written[name] = inner
                 if isinstance(inner, Scalar):
                     value = kind.value.read(inner, source)
-                elif hint := self._below_name(node, inner, kind, keys, beside):
+                elif hint := self._below_name(node, inner, keys, beside):
                     value = wrong_form(kind.value, inner, source, hint=hint)
                 else:
                     value = kind.value.read(inner, source)
@@ -246,12 +245,12 @@ class _Reader:
                     self._report_unknown(node, key, keys)
                     source.unread.nodes += (key, inner)
                     if name in _CHILDREN:
-                        self._children(TreeNode(None, key, node.node, source), name, inner)
+                        self._children(TreeNode(_ACTION, key, node.node, source), name, inner)
                     continue
                 written[name] = inner
-                if name in FIELDS and isinstance(inner, Listing):
+                if isinstance(inner, Listing) and interface and name == interface.fields:
                     typed = self._actions[node.alias].node if node.alias else node.node
-                    hint = fields_for(name, inner, typed)
+                    hint = fields_for(interface, inner, typed)
                     value = wrong_form(known.shape, inner, source, hint=hint)
                 else:
                     value = known.shape.read(inner, source)
@@ -264,8 +263,8 @@ class _Reader:
         if unknown:
             return
         missing = [
-            wanted for wanted in needs
-            if wanted.name not in written and wanted.name not in self._astray
+            key for name, key in keys.items()
+            if key.required and name not in written and name not in self._astray
         ]  # fmt: skip
         if missing and node.is_action and node.name in self._actions:
             said = f"{node.name!r} is an action of this tree: its name is the node's kind"
@@ -284,7 +283,6 @@ class _Reader:
         self,
         node: TreeNode,
         inner: Node,
-        kind: Kind,
         keys: MappingType[str, Key],
         beside: list[tuple[Scalar, Node]],
     ) -> str | None:
@@ -293,21 +291,22 @@ class _Reader:
         It is read on as if it stood where it belongs: keys that belong beside the word are added to
         `beside`. None, where nobody can tell what is meant.
         """
+        kind = node.kind
         if isinstance(kind.value, Table):
             return None
         write = f"write '{node.key.text}: {'name' if kind.named_by_value else '...'}'"
         held = next((name for name in _CHILDREN if name in keys), None)
-        fields = next((name for name in FIELDS if name in keys), None)
+        fields = kind.interface.fields if kind.interface is not None else ""
         if isinstance(inner, Mapping):
             names = {key.text for key, _ in inner.pairs}
             known = names & {*keys, "name"}
-            if known and (fields is None or known == names or known & {fields, "type"}):
+            if known and (not fields or known == names or known & {fields, "type"}):
                 beside += [pair for pair in inner.pairs if pair[0].text != "name"]
                 name = inner.get("name")
                 if isinstance(name, Scalar) and kind.named_by_value:
                     write = f"write '{node.key.text}: {name.text}'"
                 return f"{write}, and the keys beside it"
-            if fields is not None:
+            if fields:
                 return f"{write}, and the fields beside it, under '{fields}:'"
         if held is None or not kind.named_by_value or node.node.get(held) is not None:
             return None
@@ -370,10 +369,3 @@ def _decorator_of(word: str, keys: MappingType[str, Key]) -> str | None:
     if word in _DECORATORS or closest(word, keys) or any(key_here(word, keys)):
         return _DECORATORS.get(word)
     return closest(word, (*_BESIDE_CHILD, "repeat"))
-
-
-_ACTION_NAME = KINDS["sequence"]
-"""The value of an alias is the node's name, as that of a composite is."""
-_ACTION_NEEDS = required_in(ACTION_KEYS)
-_NEEDS = {kind.name: required_in(kind.keys) for kind in KINDS.values()}
-"""The keys that must be there."""

@@ -21,8 +21,8 @@ class TreeNode:
 
     `values` holds what was read under each key (the kind's own key included), `written` the YAML
     node of each; `level` is how deep it is, from 1. `alias` is the action's name in this document,
-    where the node is one; `included` the tree that a subtree stands for. `is_action` tells whether
-    it sends a goal: under an action's name, with its type in place, or to a server of trees.
+    where the node's key is one; its kind is `action` then. `included` is the tree that a subtree
+    stands for. `is_action` tells whether it sends a goal, also to a server of trees.
     """
 
     __slots__ = (
@@ -40,14 +40,16 @@ class TreeNode:
         "written",
     )
 
-    def __init__(self, kind: Kind | None, key: Scalar, node: Mapping, source: Source) -> None:
+    def __init__(
+        self, kind: Kind, key: Scalar, node: Mapping, source: Source, alias: str | None = None
+    ) -> None:
         self.kind = kind
-        self.is_action = kind is None or kind.name in ("action", "run_tree")
+        self.is_action = kind.name in ("action", "run_tree")
         self.level = 1
         self.key = key
         self.node = node
         self.source = source
-        self.alias: str | None = None
+        self.alias = alias
         self.name: str = ""
         self.values: dict[str, object] = {}
         self.written: dict[str, Node] = {}

@@ -12,7 +12,6 @@ from bt_actions.document.yaml.nodes import Mapping, Node
 __all__ = ["Write", "writes_of"]
 
 
-_ROOTS = {"subtree": None, "wait_for_message": "message"}
 _WRITERS = {"set", "for_each", *(name for name, kind in KINDS.items() if "save" in kind.keys)}
 
 
@@ -44,14 +43,14 @@ class Write:
 def writes_of(node: TreeNode, document: Document) -> list[Write]:
     """The variables that a node itself writes."""
     values = node.values
-    kind = node.kind.name if node.kind is not None else ""
-    if kind and kind not in _WRITERS:
+    kind, interface = node.kind.name, node.kind.interface
+    if kind not in _WRITERS:
         return []
     saved = values.get("save")
     own = saved if isinstance(saved, dict) else {}
     declared = document.actions.get(node.alias) if node.alias is not None else None
     shared = declared.values.get("save") if declared is not None else None
-    root = _ROOTS.get(kind, "result")
+    root = interface.root if interface is not None else None
     writes = [Write(name, node, "save", value, root) for name, value in own.items()]
     if isinstance(shared, dict):
         given = [pair for pair in shared.items() if pair[0] not in own]
