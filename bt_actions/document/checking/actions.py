@@ -11,17 +11,16 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from bt_actions.document.checking.checker import Checker
-from bt_actions.document.checking.variables import root_type
 from bt_actions.document.findings import Related
 from bt_actions.document.language.values import BAD, Computed, Interpolated, locate
 from bt_actions.document.reading.settings import merged, settings_of, when_of
-from bt_actions.document.reading.tree import Declared, TreeNode
+from bt_actions.document.reading.tree import TreeNode
 from bt_actions.document.yaml.nodes import Mapping, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.messages.conversion import Problem, examine
 from bt_actions.messages.fields import FieldType, Message
 
-__all__ = ["check_actions", "check_defaults", "check_use"]
+__all__ = ["check_actions", "check_defaults", "check_together"]
 
 
 def check_actions(checker: Checker) -> None:
@@ -58,13 +57,7 @@ def check_defaults(checker: Checker) -> None:
     with _within(checker, source, "the imported defaults"):
         for node in users.values():
             checker.reader = checker.document.actions.get(node.alias or "", checker.document)
-            checker.condition(when, {"result": root_type(node, "result", checker)})
-
-
-def check_use(checker: Checker, node: TreeNode, declared: Declared) -> None:
-    """Check a node that runs an action, with what it says beside the action's own words."""
-    checker.call(node.values, node.written, checker.action_class(declared))
-    _check_together(checker, node, declared)
+            checker.condition(when, {"result": checker.received(node)})
 
 
 @contextmanager
@@ -90,8 +83,9 @@ def _within(checker: Checker, source: Source, what: str) -> Iterator[None]:
                 )  # fmt: skip
 
 
-def _check_together(checker: Checker, node: TreeNode, declared: Declared) -> None:
+def check_together(checker: Checker, node: TreeNode) -> None:
     """Goals that are merged may each be right and not fit together: yaw, and x beside it."""
+    declared = checker.document.actions[node.alias or ""]
     shared, own = declared.values.get("goal"), node.values.get("goal")
     if not isinstance(shared, dict) or not isinstance(own, dict):
         return

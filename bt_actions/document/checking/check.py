@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bt_actions.document.checking.actions import check_actions, check_defaults, check_use
+from bt_actions.document.checking.actions import check_actions, check_defaults, check_together
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.declarations import check_declarations
 from bt_actions.document.checking.kinds import CHECKS
@@ -25,9 +25,7 @@ def check_document(checker: Checker) -> None:
 
 
 def _check_node(checker: Checker, node: TreeNode) -> None:
-    if node.alias is not None:
-        declared = checker.document.actions.get(node.alias)
-        if declared is not None:
-            check_use(checker, node, declared)
-    elif node.kind.name in CHECKS:
+    if node.kind.name in CHECKS:
         CHECKS[node.kind.name](checker, node)
+    if node.alias is not None:
+        check_together(checker, node)

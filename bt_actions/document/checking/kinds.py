@@ -10,14 +10,12 @@ from py_trees.timers import Timer
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.value_types import FLOAT, INTEGER, named
 from bt_actions.document.findings import Related
-from bt_actions.document.language.types import Record, TypeNameError, fits, misfits, parse_type
+from bt_actions.document.language.types import Record, fits, misfits
 from bt_actions.document.language.values import Computed, computed_in, constant_of, locate
-from bt_actions.document.reading.settings import when_of
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
 from bt_actions.document.yaml.nodes import Node, span_of
-from bt_actions.messages.fields import FieldType, Listing, Message, Scalar
-from bt_actions.messages.interfaces import RUN_TREE
+from bt_actions.messages.fields import FieldType, Listing, Scalar
 from bt_actions.utilities.suggest import did_you_mean, listing
 
 __all__ = ["CHECKS"]
@@ -80,11 +78,7 @@ def _input_type(checker: Checker, included: Document, name: str, at: Node) -> Fi
         if not checker.doubts_of(included).declares(name):
             _no_such(checker, included, "input", name, included.inputs, at)
         return None
-    text = declared.values.get("type")
-    try:
-        return parse_type(text, types=checker.types) if isinstance(text, str) else None
-    except TypeNameError:
-        return None  # reported where it is declared
+    return checker.declared_type(declared)
 
 
 def _no_such(
@@ -112,12 +106,7 @@ def _outputs(checker: Checker, node: TreeNode) -> None:
         if declared is None:
             _no_such(checker, included, "output", output, included.outputs, inner)
             continue
-        text = declared.values.get("type")
-        if isinstance(text, str):
-            try:
-                checker.assigns(key.text, parse_type(text, types=checker.types), inner)
-            except TypeNameError:
-                continue  # reported where it is declared
+        checker.assigns(key.text, checker.declared_type(declared), inner)
 
 
 def _condition_of(key: str) -> Callable[[Checker, TreeNode], None]:
@@ -166,19 +155,11 @@ def _for_each(checker: Checker, node: TreeNode) -> None:
         checker.value(None, items, node.written["in"], prose=True)
 
 
-def _interface(checker: Checker, node: TreeNode) -> type | None:
-    name, interface = node.values.get("type"), node.kind.interface
-    if interface is None or not isinstance(name, str):
-        return None
-    return checker.interface(name, interface.kind, node.written["type"])
-
-
 def _call(checker: Checker, node: TreeNode) -> None:
-    checker.call(node.values, node.written, _interface(checker, node), node.kind)
+    checker.call(node.values, node.written, checker.class_of(node), node.kind)
 
 
 def _run_tree(checker: Checker, node: TreeNode) -> None:
-    cls = checker.interface(RUN_TREE, "action", node.key)
     text = node.values.get("tree")
     if text is not None:
         checker.value(Scalar("string"), text, node.written["tree"], prose=True)
@@ -186,30 +167,17 @@ def _run_tree(checker: Checker, node: TreeNode) -> None:
     if inputs is not None and written is not None:
         checker.value(None, inputs, written)
         checker.finite(inputs, written)
-    roots = {"result": None if cls is None else Message(cls.Result), "outputs": None}  # type: ignore[attr-defined]
-    for condition in (node.values.get("expect"), when_of(node.values)):
-        checker.condition(condition, roots)
-    checker.save(node.values.get("save"), roots)
+    checker.call(node.values, node.written, checker.class_of(node), node.kind, {"outputs": None})
 
 
 def _publish(checker: Checker, node: TreeNode) -> None:
-    cls = _interface(checker, node)
-    if "message" in node.values:
-        kind = None if cls is None else Message(cls)
-        checker.value(kind, node.values["message"], node.written["message"])
+    _call(checker, node)
     alone = "timeout" in node.values and "subscribers" not in node.values
     if alone and not checker.doubts.own(node):
         said = "'timeout' is how long to wait for 'subscribers', which are missing"
         checker.source.report(
             "BT108", span_of(node.written["timeout"]), said, hint="subscribers: 1"
         )
-
-
-def _wait_for_message(checker: Checker, node: TreeNode) -> None:
-    cls = _interface(checker, node)
-    roots = {"message": None if cls is None else Message(cls)}
-    checker.condition(node.values.get("until"), roots)
-    checker.save(node.values.get("save"), roots)
 
 
 def _set(checker: Checker, node: TreeNode) -> None:
@@ -293,7 +261,7 @@ CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
         "subtree": _subtree,
         "timeout": _number_of("after", FLOAT, zero=False),
         "wait": _number_of("wait", FLOAT),
-        "wait_for_message": _wait_for_message,
+        "wait_for_message": _call,
         "wait_until": _condition_of("wait_until"),
         "while": _condition_of("while"),
     }
