@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from pathlib import PurePath
 from types import MappingProxyType
 from urllib.parse import quote
@@ -80,27 +81,11 @@ REPORTS: Mapping[str, Callable[[Sequence[Finding]], str]] = MappingProxyType(
 
 
 def _plain(finding: Finding) -> dict[str, object]:
-    plain: dict[str, object] = {
-        "file": finding.file,
-        "line": finding.line,
-        "column": finding.column,
-        "end_line": finding.end_line,
-        "end_column": finding.end_column,
-        "code": finding.code,
-        "severity": finding.severity.value,
-        "message": finding.message,
-    }
-    if finding.hint:
-        plain["hint"] = finding.hint
+    plain = asdict(finding)
+    del plain["source_line"]
     if finding.related is not None:
-        place = finding.related.place
-        plain["related"] = {
-            "file": place.file,
-            "line": place.line,
-            "column": place.column,
-            "message": finding.related.message,
-        }
-    return plain
+        plain["related"] = {**finding.related.place._asdict(), "message": finding.related.message}
+    return {name: value for name, value in plain.items() if value}
 
 
 def _with_hint(finding: Finding) -> str:

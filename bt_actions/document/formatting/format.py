@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections import Counter
 
 from bt_actions.document.findings import DocumentError, Span
-from bt_actions.document.formatting.key_order import forms
-from bt_actions.document.formatting.layout import FormatError, Layout
+from bt_actions.document.formatting.layout import FormatError, Layout, forms
 from bt_actions.document.language.keys import TOP_KEYS
 from bt_actions.document.yaml.comments import comments_of, scalars_of
 from bt_actions.document.yaml.compose import compose, compose_written

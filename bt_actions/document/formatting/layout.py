@@ -7,18 +7,19 @@ warning goes with the line that follows it, whatever becomes of the item that be
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterable, Iterator
 from collections.abc import Mapping as MappingType
 
-from bt_actions.document.formatting.key_order import in_order, item_shape, shapes_of
-from bt_actions.document.formatting.trailing import trailing_comments
+from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES
+from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.shape import Shape
+from bt_actions.document.language.shapes import Key, ListOf, OneOf, Record, Table
 from bt_actions.document.yaml.comments import Comment, block_header, comments_of, scalars_of
 from bt_actions.document.yaml.ignores import is_ignore
 from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["FormatError", "Layout"]
+__all__ = ["FormatError", "Layout", "forms"]
 
 _STEP = 2
 _DASHES = re.compile(r"\s*-(\s+-)*\s*")
@@ -39,7 +40,7 @@ class Layout:
         self._behind = {one.line: one for one in comments if not one.alone}
         self._alone = {one.line: one for one in comments if one.alone}
         self._ignores = {line for line, one in self._alone.items() if is_ignore(one)}
-        self._ends = trailing_comments(root, source, self._alone, anchors)
+        self._ends = _trailing_comments(root, source, self._alone, anchors)
         self._used = {line for block in self._ends.values() for line, _ in block}
         self._bare = set(_bare_dashes(source, root))
 
@@ -57,7 +58,7 @@ class Layout:
         self, node: Mapping, indent: int, shapes: MappingType[str, Shape | None], lead: str = ""
     ) -> None:
         """A block mapping; `lead` stands before its first key (the dash of a list's item)."""
-        for at, (key, value) in enumerate(in_order(node, shapes)):
+        for at, (key, value) in enumerate(_in_order(node, shapes)):
             before = " " * (indent - len(lead)) + lead if at == 0 else " " * indent
             if at or not lead:
                 self._leading(key.line, indent)
@@ -70,10 +71,10 @@ class Layout:
         head = f"{before}{self._raw(key)}:"
         if isinstance(value, Mapping) and not value.flow and value.pairs:
             self._opening(head, key.line, value)
-            self.mapping(value, indent + _STEP, shapes_of(value, shape))
+            self.mapping(value, indent + _STEP, _shapes_of(value, shape))
         elif isinstance(value, Listing) and not value.flow and value.items:
             self._opening(head, key.line, value)
-            self._items(value, indent + _STEP, item_shape(shape))
+            self._items(value, indent + _STEP, _item_shape(shape))
         else:
             self._value(head, value, key.line, indent, shape)
 
@@ -97,7 +98,7 @@ class Layout:
         line = at = item.line
         if not self._ignores or not isinstance(item, Mapping) or item.flow:
             return line
-        if in_order(item, shapes_of(item, shape))[0][0].line == line:
+        if _in_order(item, _shapes_of(item, shape))[0][0].line == line:
             return line
         while at > 1 and (at - 1 in self._alone or not self._source.lines[at - 2].strip()):
             at -= 1
@@ -108,19 +109,19 @@ class Layout:
         """An item of a block list; `lead` is its dash, behind those of lists around it."""
         start = " " * (indent + _STEP - len(lead)) + lead.rstrip()
         if isinstance(item, Mapping) and not item.flow and item.pairs:
-            shapes = shapes_of(item, shape)
+            shapes = _shapes_of(item, shape)
             if id(item) in self._anchors:
                 self._put(start + self._anchor(item), item.line)
                 self.mapping(item, indent + _STEP, shapes)
                 return
-            first = in_order(item, shapes)[0][0]
+            first = _in_order(item, shapes)[0][0]
             if first.line != item.line:
                 self._leading(first.line, indent + _STEP - len(lead))
             self.mapping(item, indent + _STEP, shapes, lead)
         elif isinstance(item, Listing) and not item.flow and item.items:
             if id(item) in self._anchors:
                 raise FormatError(f"line {item.line}: an anchor at a list in a list")
-            self._items(item, indent + _STEP, item_shape(shape), lead)
+            self._items(item, indent + _STEP, _item_shape(shape), lead)
         else:
             self._value(start, item, item.line, indent, shape)
 
@@ -152,12 +153,12 @@ class Layout:
         anchor = self._anchor(node).lstrip()
         anchor = f"{anchor} " if anchor else ""
         if isinstance(node, Listing):
-            said = ", ".join(self._flow(item, item_shape(shape)).rstrip() for item in node.items)
+            said = ", ".join(self._flow(item, _item_shape(shape)).rstrip() for item in node.items)
             return f"{anchor}[{said}]"
         assert isinstance(node, Mapping)
         parts = []
-        shapes = shapes_of(node, shape)
-        for key, value in in_order(node, shapes):
+        shapes = _shapes_of(node, shape)
+        for key, value in _in_order(node, shapes):
             said = self._flow(value, shapes.get(key.text))
             parts.append(f"{self._raw(key)}: {said}")
         return f"{anchor}{{{', '.join(parts)}}}"
@@ -312,3 +313,107 @@ def _trimmed(text: str) -> str:
     """Without spaces at the end, but where a backslash makes them count."""
     trimmed = text.rstrip()
     return text if trimmed.endswith("\\") else trimmed
+
+
+def _shapes_of(node: Mapping, shape: Shape | None) -> MappingType[str, Shape | None]:
+    """The form of what stands under each key of a mapping, in the order that the model has.
+
+    Keys that it does not know stay where they are, behind the others.
+    """
+    names = [key.text for key, _ in node.pairs]
+    if shape is NODE:
+        return _node_shapes(names)
+    if isinstance(shape, OneOf):
+        shape = shape.record
+    if isinstance(shape, Record):
+        return forms(shape.keys)
+    if isinstance(shape, Table):
+        return dict.fromkeys(names, shape.item)
+    return dict.fromkeys(names)
+
+
+def _node_shapes(names: list[str]) -> MappingType[str, Shape | None]:
+    """The keys of a node: its kind or its action first, what it holds last."""
+    kinds = [name for name in names if name in KINDS]
+    if "child" not in names:  # settings of an action, then
+        kinds = [name for name in kinds if name not in ("timeout", "retry")]
+    foreign = [name for name in names if name not in ACTION_KEYS]
+    if len(kinds) == 1:
+        kind = KINDS[kinds[0]]
+        rest = forms(kind.keys)
+        ordered: dict[str, Shape | None] = {kind.name: kind.value, "name": rest.pop("name", None)}
+        last = {name: rest.pop(name) for name in ("child", "children") if name in rest}
+        return ordered | rest | last
+    if len(foreign) == 1:
+        return {foreign[0]: None, **forms(ACTION_KEYS)}
+    return dict.fromkeys(names)
+
+
+def forms(keys: MappingType[str, Key]) -> dict[str, Shape | None]:
+    """The form of each key, in their order."""
+    return {name: key.shape for name, key in keys.items()}
+
+
+def _item_shape(shape: Shape | None) -> Shape | None:
+    """The form of a list's items."""
+    if shape is NODES:
+        return NODE
+    return shape.item if isinstance(shape, ListOf) else None
+
+
+def _in_order(node: Mapping, order: Iterable[str]) -> list[tuple[Scalar, Node]]:
+    """The pairs of a mapping; those whose keys `order` lacks stay behind the others."""
+    rank = {name: at for at, name in enumerate(order)}
+    return sorted(node.pairs, key=lambda pair: rank.get(pair[0].text, len(rank)))
+
+
+def _trailing_comments(
+    root: Node, source: Source, alone: MappingType[int, Comment], anchored: Container[int]
+) -> dict[int, list[tuple[int, str]]]:
+    """The comments and blank lines at the end of blocks, with their lines, by the block's `id`.
+
+    They belong to a block where they are indented as what is in it. A comment that silences a
+    warning belongs to what follows it, however it is indented.
+    """
+    found: dict[int, list[tuple[int, str]]] = {}
+    taken: set[int] = set()
+    for node, column in reversed(list(_blocks(root, anchored))):  # the inner before the outer
+        lines = [one for one in _lines_of(node, column, source, alone) if one[0] not in taken]
+        if lines:
+            found[id(node)] = lines
+            taken.update(line for line, _ in lines)
+    return found
+
+
+def _blocks(root: Node, anchored: Container[int]) -> Iterator[tuple[Mapping | Listing, int]]:
+    """The block collections below the root, each behind what it is in, with their columns."""
+    stack = [root]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, Mapping) and not node.flow and node.pairs:
+            if node is not root:
+                yield node, node.pairs[0][0].column
+            stack.extend(value for _, value in node.pairs)
+        elif isinstance(node, Listing) and not node.flow and node.items:
+            if id(node) not in anchored:  # else its column is its anchor's
+                yield node, node.column
+            stack.extend(node.items)
+
+
+def _lines_of(
+    node: Mapping | Listing, column: int, source: Source, alone: MappingType[int, Comment]
+) -> list[tuple[int, str]]:
+    lines = source.lines
+    at = first = node.end_line + (node.end_column > 1 or node.end_line == node.line)
+    while at <= len(lines) and (at in alone or not lines[at - 1].strip()):
+        at += 1
+    after = lines[at - 1] if at <= len(lines) else ""
+    least = max(column, len(after) - len(after.lstrip(" ")) + 2 if after else 2)
+    found: list[tuple[int, str]] = []
+    own = 0
+    for line in range(first, at):
+        if line in alone and (alone[line].column < least or is_ignore(alone[line])):
+            break
+        found.append((line, alone[line].text if line in alone else ""))
+        own = len(found) if line in alone else own
+    return found[:own]

@@ -10,7 +10,14 @@ from pathlib import Path
 from bt_actions.document.yaml.source import broken_link
 from bt_actions.utilities.suggest import closest, did_you_mean, listing
 
-__all__ = ["TreeNotFoundError", "find_tree", "installed_trees", "tree_folder", "tree_folders"]
+__all__ = [
+    "TreeNotFoundError",
+    "find_tree",
+    "installed_trees",
+    "is_file",
+    "tree_folder",
+    "tree_folders",
+]
 
 _SUFFIXES = (".yaml", ".yml")
 _MOST = 4
@@ -40,7 +47,7 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
         raise TreeNotFoundError("the name of a tree is needed, not an empty text")
     path = name_or_path if isinstance(name_or_path, Path) else Path(wanted)
     exact = path if beside is None else beside / path
-    if _is_file(exact):
+    if is_file(exact):
         return exact
     candidates: list[Path] = []
     if path.suffix not in _SUFFIXES and exact.name:
@@ -53,7 +60,7 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
             folder / (wanted + suffix) for folder in tree_folders() for suffix in _SUFFIXES
         ]
     for candidate in candidates:
-        if _is_file(candidate):
+        if is_file(candidate):
             return candidate
     if _is_there(exact):
         return exact  # whoever reads it will say what it is
@@ -125,7 +132,7 @@ def _in_package(wanted: str) -> Path:
         raise TreeNotFoundError(f"{wanted!r} is no place: it is written package://pkg/trees/x.yaml")
     places = [prefix / "share" / package / inner for prefix in _prefixes()]
     for candidate in places:
-        if _is_file(candidate):
+        if is_file(candidate):
             return candidate
     _refuse_links(*places)
     near = next(filter(None, map(_beside, places)), "")
@@ -140,7 +147,8 @@ def _refuse_links(*places: Path) -> None:
                 raise TreeNotFoundError(f"{path} is {link}")
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Whether a path leads to a file, as far as it can be asked."""
     try:
         return path.is_file()
     except (OSError, ValueError):

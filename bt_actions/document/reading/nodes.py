@@ -20,8 +20,7 @@ from bt_actions.document.language.shapes import (
     report_unknown_key,
 )
 from bt_actions.document.language.values import BAD
-from bt_actions.document.reading.around import a_kind, around
-from bt_actions.document.reading.listed import fields_for
+from bt_actions.document.reading.instead import a_kind, around, fields_for
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of

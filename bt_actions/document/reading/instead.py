@@ -1,11 +1,17 @@
-"""What to write for a decorator that was written as a setting of another node."""
+"""What to write for a decorator that was written as a setting of another node, and for fields that
+were written as a list."""
 
 from __future__ import annotations
 
-from bt_actions.document.language.kinds import KINDS
-from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
+import contextlib
 
-__all__ = ["a_kind", "around"]
+from bt_actions.document.language.kinds import KINDS, Interface
+from bt_actions.document.language.shape import is_computed
+from bt_actions.document.language.types import interface_of
+from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, data_of
+from bt_actions.messages.as_fields import as_fields
+
+__all__ = ["a_kind", "around", "fields_for"]
 
 _LONGEST = 40
 _SIGNS = frozenset(":,{}[]#\n")
@@ -43,3 +49,16 @@ def _text(node: Node | None) -> str:
     """A short scalar as it is, if it can stand in braces so; dots for anything else."""
     said = node.text if isinstance(node, Scalar) else ""
     return said if 0 < len(said) <= _LONGEST and _SIGNS.isdisjoint(said) else "..."
+
+
+def fields_for(interface: Interface, inner: Listing, typed: Node) -> str | None:
+    """Return a hint for a list in the place of fields; `typed` holds the interface's type."""
+    named = typed.get("type") if isinstance(typed, Mapping) else None
+    if not isinstance(named, Scalar):
+        return None
+    with contextlib.suppress(ValueError):  # TypeNameError is one
+        cls = interface_of(named.text, interface.kind)
+        data = [None if is_computed(each) else data_of(each) for each in inner.items]
+        instead = as_fields(interface.sent_by(cls), data)
+        return f"write {instead}" if instead else None
+    return None
