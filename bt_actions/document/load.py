@@ -21,7 +21,7 @@ from bt_actions.document.reading.inputs import TreeInput, check_inputs, inputs_o
 from bt_actions.document.reading.tree import Document
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.reading.workspace import Workspace
-from bt_actions.document.yaml.ignores import apply_ignores
+from bt_actions.document.yaml.comments import apply_ignores
 from bt_actions.document.yaml.source import Source, TooManyErrors
 from bt_actions.utilities.plain_data import plain
 

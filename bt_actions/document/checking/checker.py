@@ -39,10 +39,9 @@ from bt_actions.document.language.values import (
     names_file,
 )
 from bt_actions.document.reading.inputs import refuse_infinite
-from bt_actions.document.reading.settings import when_of
+from bt_actions.document.reading.settings import Write, when_of, writes_of
 from bt_actions.document.reading.tree import Declared, Document, TreeNode
 from bt_actions.document.reading.unread import Doubts
-from bt_actions.document.reading.writes import Write, writes_of
 from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.expressions.expression import Expression, ExpressionError

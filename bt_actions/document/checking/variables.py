@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping, Sequence
 
-from bt_actions.document.reading.writes import Write
+from bt_actions.document.reading.settings import Write
 from bt_actions.messages.fields import FieldType
 
 __all__ = ["infer_variables", "items_inside"]

@@ -14,8 +14,13 @@ from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES
 from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.shape import Shape
 from bt_actions.document.language.shapes import Key, ListOf, OneOf, Record, Table
-from bt_actions.document.yaml.comments import Comment, block_header, comments_of, scalars_of
-from bt_actions.document.yaml.ignores import is_ignore
+from bt_actions.document.yaml.comments import (
+    Comment,
+    block_header,
+    comments_of,
+    is_ignore,
+    scalars_of,
+)
 from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 

@@ -16,26 +16,21 @@ _LONG = 500.0
 
 def warn_bare_duration(node: Scalar, seconds: float, source: Source) -> None:
     """Warn of so many seconds that milliseconds are likely to be meant."""
-    text = node.text.strip()
-    if abs(seconds) >= _LONG and not text[-1].isalpha():
-        text = _brief(text)
-        source.report(
-            "BT317", span_of(node),
-            f"{text} without a unit is {text} s = {spoken_duration(seconds)}",
-            hint=f"for milliseconds write {text} ms, else {text} s",
-        )  # fmt: skip
+    if abs(seconds) >= _LONG:
+        said = "is {} s = " + spoken_duration(seconds)
+        _warn(node, source, "BT317", said, "for milliseconds write {0} ms, else {0} s")
 
 
 def warn_bare_angle(node: Scalar, radians: float, source: Source) -> None:
     """Warn of an angle beyond a full turn: degrees are likely to be meant."""
+    if abs(radians) > TURN:
+        _warn(node, source, "BT318", "is in radians", "for degrees write {0} deg, else {0} rad")
+
+
+def _warn(node: Scalar, source: Source, code: str, said: str, hint: str) -> None:
     text = node.text.strip()
-    if abs(radians) > TURN and not text[-1].isalpha():
-        text = _brief(text)
-        source.report(
-            "BT318", span_of(node), f"{text} without a unit is in radians",
-            hint=f"for degrees write {text} deg, else {text} rad",
-        )  # fmt: skip
-
-
-def _brief(text: str) -> str:
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+    if text[-1].isalpha():  # a unit
+        return
+    text = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+    message = f"{text} without a unit {said.format(text)}"
+    source.report(code, span_of(node), message, hint=hint.format(text))

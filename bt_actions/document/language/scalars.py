@@ -157,10 +157,7 @@ class Whole:
 
     least: int = 0
     values: bool = False
-
-    @property
-    def words(self) -> str:
-        return "a whole number"
+    words: str = "a whole number"
 
     def read(self, node: Node, source: Source) -> object:
         if self.values and is_computed(node):

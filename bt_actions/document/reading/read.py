@@ -6,7 +6,6 @@ part that was reported stands as BAD, so that nothing is said about it twice.
 
 from __future__ import annotations
 
-from collections.abc import Container
 from collections.abc import Mapping as MappingType
 
 from bt_actions.document.findings import Span
@@ -54,8 +53,7 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
         )
         return None
     misplaced = _misplaced(node, keys, source) if "root" in keys else []
-    rest = _without(node, {"root", *misplaced})
-    values = read_keys(rest, _but_root(keys), source, keys)
+    values = read_keys(node, keys, source, {"root", *misplaced})
     wanted = "root" in keys and not library and node.get("root") is None
     if wanted and all(closest(key.text, keys) != "root" for key, _ in node.pairs):
         message = "the key 'root' is missing: it holds the tree's nodes"
@@ -87,18 +85,6 @@ def _misplaced(node: Mapping, keys: MappingType[str, Key], source: Source) -> li
 
 def _of_node(name: str) -> bool:
     return name in KINDS or name in NODE_KEYS
-
-
-def _without(node: Mapping, names: Container[str]) -> Mapping:
-    copy = Mapping()
-    copy.begin = copy.end = node.begin
-    copy.flow = node.flow
-    copy.pairs = [pair for pair in node.pairs if pair[0].text not in names]
-    return copy
-
-
-def _but_root(keys: MappingType[str, Key]) -> MappingType[str, Key]:
-    return {name: key for name, key in keys.items() if name != "root"}
 
 
 def _declare(document: Document, table: str, into: dict[str, Declared]) -> None:
