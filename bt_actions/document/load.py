@@ -28,7 +28,7 @@ from bt_actions.utilities.plain_data import plain
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
-    from bt_actions.document.building.scope import Scope
+    from bt_actions.document.building.context import Scope
     from bt_actions.document.language.classes import Python
 
 __all__ = [
@@ -183,7 +183,7 @@ def _built(
     once: bool = False,
 ) -> Behaviour:
     from bt_actions.document.building.build import build
-    from bt_actions.document.building.scope import Scope
+    from bt_actions.document.building.context import Scope
 
     values = check_inputs(document, inputs or {}, types=types)
     scope = Scope.of_load(document.name)

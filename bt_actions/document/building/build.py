@@ -19,9 +19,8 @@ from bt_actions.behaviours.decorators import Deadline, ForEach, Repeat, RetryChi
 from bt_actions.behaviours.leaves import WaitUntil
 from bt_actions.behaviours.parallel import Parallel
 from bt_actions.behaviours.topics import TopicValue, patient
-from bt_actions.document.building.context import Context, plain_name, table_of, written_text
+from bt_actions.document.building.context import Context, Scope, plain_name, table_of, written_text
 from bt_actions.document.building.leaves import LEAVES
-from bt_actions.document.building.scope import Scope
 from bt_actions.document.findings import NODE
 from bt_actions.document.language.bounds import refuse_large
 from bt_actions.document.language.classes import Python

@@ -1,17 +1,25 @@
-"""What a node is built in: its document, its variables, its namespace. Builds nothing itself."""
+"""What a node is built in: its document, its variables, its namespace. Builds nothing itself.
+
+The variables of a loaded tree lie on py_trees' blackboard under a namespace of their own. The
+blackboard is process-global and has no lock: read and write on the ticking thread only.
+"""
 
 from __future__ import annotations
 
 import ast
+import itertools
+import re
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from operator import attrgetter
 from typing import Any
 
+from py_trees.blackboard import Blackboard
+
 from bt_actions.behaviours.reading import Formula, Names
 from bt_actions.behaviours.topics import TopicValue
-from bt_actions.document.building.scope import Scope
 from bt_actions.document.language.bounds import refuse_large
 from bt_actions.document.language.classes import Python
 from bt_actions.document.language.types import parse_type
@@ -23,9 +31,91 @@ from bt_actions.document.yaml.nodes import Scalar
 from bt_actions.expressions.expression import Expression
 from bt_actions.messages import fields
 
-__all__ = ["Context", "plain_name", "table_of", "written_text"]
+__all__ = ["Context", "Scope", "plain_name", "table_of", "written_text"]
 
 _NUMBERS = {*fields.FLOATS, *fields.INTEGERS} - {"byte"}
+_ODD = re.compile(r"[^A-Za-z0-9_]")
+_LOADS = "/bt/loads"
+"""The blackboard's key of its own `_Loads`: on one that was cleared they begin anew."""
+
+
+class _Loads:
+    """What tells the trees of a blackboard apart, and which of them are gone. Atomic steps only."""
+
+    def __init__(self) -> None:
+        self.numbers = itertools.count(1)
+        self.gone: deque[str] = deque()
+        """Prefixes of which no scope is left; the collector may come in the middle of a tick."""
+
+
+class Scope:
+    """Names of a tree and where their values lie; `topics` are read before the blackboard."""
+
+    def __init__(self, prefix: str) -> None:
+        self.prefix = prefix
+        self._outer: Scope | None = None
+        self._gone: deque[str] | None = None
+        self._children: dict[str, int] = {}
+
+    def __repr__(self) -> str:
+        return f"<Scope {self.prefix}>"
+
+    @classmethod
+    def of_load(cls, tree: str) -> Scope:
+        """The scope of a tree that is loaded now: no other load has the same.
+
+        Its variables are forgotten at a later load, when nothing of the tree is left.
+        """
+        loads = Blackboard.storage.setdefault(_LOADS, _Loads())
+        while True:
+            try:
+                prefix = f"{loads.gone.popleft()}/"
+            except IndexError:
+                break
+            for key in [key for key in list(Blackboard.storage) if key.startswith(prefix)]:
+                Blackboard.unset(key)
+            for key in [key for key in list(Blackboard.metadata) if key.startswith(prefix)]:
+                Blackboard.metadata.pop(key, None)
+        scope = cls(f"/bt/{_safe(tree)}/{next(loads.numbers)}")
+        scope._gone = loads.gone
+        return scope
+
+    def __del__(self) -> None:
+        if self._gone is not None:
+            self._gone.append(self.prefix)
+
+    def inner(self, tree: str) -> Scope:
+        """The scope of a tree included in this one."""
+        name = _safe(tree)
+        number = self._children[name] = self._children.get(name, 0) + 1
+        scope = Scope(f"{self.prefix}/{name}_{number}")
+        scope._outer = self  # which lives as long, and so do the variables
+        return scope
+
+    def key(self, name: str) -> str:
+        """The blackboard key of a variable."""
+        return f"{self.prefix}/{name}"
+
+    def read(self, name: str) -> object:
+        """The value of a variable. Raises KeyError when it has none."""
+        return Blackboard.storage[self.key(name)]
+
+    def write(self, name: str, value: object) -> None:
+        """Give a variable a value."""
+        Blackboard.set(self.key(name), value)
+
+    def write_all(self, values: Mapping[str, object]) -> None:
+        """Give several variables their values."""
+        for name, value in values.items():
+            self.write(name, value)
+
+    def clear(self, name: str) -> None:
+        """Take a variable's value away, if it has one."""
+        Blackboard.unset(self.key(name))
+
+
+def _safe(name: str) -> str:
+    return _ODD.sub("_", name) or "tree"
 
 
 @dataclass(frozen=True, slots=True)

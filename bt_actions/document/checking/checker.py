@@ -15,8 +15,15 @@ from typing import TYPE_CHECKING
 
 from bt_actions.document.checking.infer import Wrong, infer
 from bt_actions.document.checking.unmarked import marked_here, warn_unmarked
-from bt_actions.document.checking.value_types import BOOL, TEXT, common_type, named, type_of_literal
-from bt_actions.document.checking.variables import infer_variables, items_inside
+from bt_actions.document.checking.value_types import (
+    BOOL,
+    TEXT,
+    common_type,
+    infer_variables,
+    items_inside,
+    named,
+    type_of_literal,
+)
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
 from bt_actions.document.language.bare import warn_bare_angle, warn_bare_duration
@@ -176,6 +183,11 @@ class Checker:
             if isinstance(text, str):
                 self._classes[name] = self.interface(text, "action", at, declared.source)
         return self._classes[name]
+
+    def written_by(self, node: TreeNode) -> frozenset[str]:
+        """The names of the variables that a node itself writes."""
+        writes = self.writes.get(id(node))
+        return frozenset([write.name for write in writes]) if writes else frozenset()
 
     def class_of(self, node: TreeNode) -> type | None:
         """The class of the interface that a node talks over, or None after reporting."""

@@ -29,9 +29,6 @@ _DOES_WITHOUT = frozenset({"invert", "force_success"})
 """Kinds that succeed where their child has failed."""
 
 
-_NOTHING: frozenset[str] = frozenset()
-
-
 class _Need(NamedTuple):
     """A read that fails a node while the variable has no value."""
 
@@ -68,7 +65,7 @@ class _Missing:
         """Look at a node and what is below it."""
         if node.kind.name == "fallback" and not self._doubts.below(node):
             self._look_at(node)
-        self._written |= self._writes(node)
+        self._written |= self._checker.written_by(node)
         added: set[str] = set()
         for child in node.children:
             self.visit(child)
@@ -114,7 +111,7 @@ class _Missing:
 
     def _work_out(self, node: TreeNode) -> _Needs:
         needs = [*self._own(node)]
-        there = {*self._writes(node), *(need.name for need in needs)}
+        there = {*self._checker.written_by(node), *(need.name for need in needs)}
         kind = node.kind.name
         if kind in ("check", "wait_until"):
             there.update(*(one.expression.names for one in computed_in(node.values.get(kind))))
@@ -136,10 +133,6 @@ class _Missing:
             for name in dict.fromkeys(computed.expression.variables):
                 if name not in computed.expression.asked:
                     yield _Need(name, node, computed)
-
-    def _writes(self, node: TreeNode) -> frozenset[str]:
-        writes = self._checker.writes.get(id(node))
-        return frozenset([write.name for write in writes]) if writes else _NOTHING
 
     def _report(self, need: _Need, first: _Need) -> None:
         source, at = self._checker.source, span_of(need.node.key)

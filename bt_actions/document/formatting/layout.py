@@ -21,7 +21,7 @@ from bt_actions.document.yaml.comments import (
     is_ignore,
     scalars_of,
 )
-from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar
+from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar, walk
 from bt_actions.document.yaml.source import Source
 
 __all__ = ["FormatError", "Layout", "forms"]
@@ -288,26 +288,11 @@ class Layout:
 
 def _bare_dashes(source: Source, root: Node) -> Iterator[int]:
     """The lines that hold nothing but the dash of an item that begins further down."""
-    starts = {node.line for node in _nodes(root)}
+    nodes = (node for node in walk(root) if not isinstance(node, Listing) or node.flow)
+    starts = {node.line for node in nodes}
     for number, line in enumerate(source.lines, 1):
         if "-" in line and number not in starts and _DASHES.fullmatch(line.split("#")[0]):
             yield number
-
-
-def _nodes(root: Node) -> Iterator[Node]:
-    stack = [root]
-    while stack:
-        node = stack.pop()
-        if isinstance(node, Listing):
-            if node.flow:
-                yield node
-            stack.extend(node.items)
-        elif isinstance(node, Mapping):
-            yield node
-            for key, value in node.pairs:
-                stack += [key, value]
-        else:
-            yield node
 
 
 def _indent(text: str) -> int:

@@ -49,16 +49,11 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
     exact = path if beside is None else beside / path
     if is_file(exact):
         return exact
-    candidates: list[Path] = []
-    if path.suffix not in _SUFFIXES and exact.name:
-        candidates += [exact.with_name(path.name + suffix) for suffix in _SUFFIXES]
+    endings = ("",) if path.suffix in _SUFFIXES else _SUFFIXES
+    candidates = [exact.with_name(path.name + ending) for ending in endings if exact.name]
     is_name = len(path.parts) == 1 and not wanted.startswith(".")
-    if is_name and path.suffix in _SUFFIXES:
-        candidates += [folder / path for folder in tree_folders()]
-    elif is_name:
-        candidates += [
-            folder / (wanted + suffix) for folder in tree_folders() for suffix in _SUFFIXES
-        ]
+    for folder in tree_folders() if is_name else ():
+        candidates += [folder / (path.name + ending) for ending in endings]
     for candidate in candidates:
         if is_file(candidate):
             return candidate
@@ -87,10 +82,8 @@ def tree_folder(place: str | os.PathLike[str]) -> Path:
     wanted = os.fspath(place)
     if not wanted.startswith("package://"):
         return Path(wanted)
-    package, _, inner = wanted.removeprefix("package://").partition("/")
-    for prefix in _prefixes():
-        candidate = prefix / "share" / package / inner
-        if package and ".." not in Path(inner).parts and candidate.is_dir():
+    for candidate in _places(wanted):
+        if candidate.is_dir():
             return candidate
     raise TreeNotFoundError(f"there is no folder {wanted!r}: it is written package://pkg/trees")
 
@@ -126,11 +119,19 @@ def _packages(prefix: Path) -> list[str]:
         return []
 
 
+def _places(wanted: str) -> list[Path]:
+    """Where a place in a package may lie."""
+    package, _, inner = wanted.removeprefix("package://").partition("/")
+    if not package or ".." in Path(inner).parts:
+        return []
+    return [prefix / "share" / package / inner for prefix in _prefixes()]
+
+
 def _in_package(wanted: str) -> Path:
     package, _, inner = wanted.removeprefix("package://").partition("/")
-    if not package or not inner or ".." in Path(inner).parts:
+    places = _places(wanted)
+    if not inner or not places:
         raise TreeNotFoundError(f"{wanted!r} is no place: it is written package://pkg/trees/x.yaml")
-    places = [prefix / "share" / package / inner for prefix in _prefixes()]
     for candidate in places:
         if is_file(candidate):
             return candidate

@@ -14,7 +14,6 @@ from bt_actions.document.language.types import parse_type
 from bt_actions.document.language.values import names_file, read_data, read_value, resolve
 from bt_actions.document.reading.tree import Declared, Document
 from bt_actions.document.yaml.compose import compose
-from bt_actions.document.yaml.nodes import Node
 from bt_actions.document.yaml.source import Source, TooManyErrors
 from bt_actions.messages.fields import Message, Scalar
 from bt_actions.utilities.suggest import did_you_mean, listing
@@ -116,7 +115,12 @@ def parse_text(text: str) -> object:
     node = compose(source)
     if source.findings:
         raise ValueError(f"{text!r}: {source.findings[0].message}")
-    value = _plain(node) if node is not None else None
+    value: object = None
+    with contextlib.suppress(TooManyErrors):  # which are filed
+        value = None if node is None else read_value(node, source)
+    for finding in source.findings:
+        raise ValueError(f"{finding.message} ({finding.hint})" if finding.hint else finding.message)
+    value = resolve(value, lambda name: f"${name}")
     refuse_large(value)
     refuse_infinite(value)
     return value
@@ -137,16 +141,6 @@ def refuse_infinite(value: object) -> None:
             continue  # seen without a loop of Python's
         elif hasattr(value, "tolist"):
             waiting.append(value.tolist())
-
-
-def _plain(node: Node) -> object:
-    source = Source("value", "")
-    value: object = None
-    with contextlib.suppress(TooManyErrors):  # which are filed
-        value = read_value(node, source)
-    for finding in source.findings:
-        raise ValueError(f"{finding.message} ({finding.hint})" if finding.hint else finding.message)
-    return resolve(value, lambda name: f"${name}")
 
 
 def _fit(document: Document, name: str, value: object, text: str, *, types: bool) -> object:

@@ -144,12 +144,10 @@ class _Reader:
                 said = inner
         if said is not None and self._typed(written, said):
             return None
-        if len(kinds) == 1 and kinds[0].text not in _BESIDE_CHILD:
-            return kinds[0]
-        has_child = any(key.text == "child" for key, _ in written.pairs)
-        found = [key for key in kinds if has_child or key.text not in _BESIDE_CHILD]
-        if len(found) > 1 and has_child:
-            found = [key for key in found if key.text not in _BESIDE_CHILD] or found[:1]
+        found = [key for key in kinds if key.text not in _BESIDE_CHILD]
+        beside = [key for key in kinds if key.text in _BESIDE_CHILD]
+        if not found and written.get("child") is not None:
+            found = beside[:1]
         if len(found) == 1:
             return found[0]
         if found:
@@ -163,16 +161,10 @@ class _Reader:
             )  # fmt: skip
             return None
         words = [key for key, _ in written.pairs if key.text not in NODE_KEYS]
-        beside = [key for key, _ in written.pairs if key.text in _BESIDE_CHILD]
-        if (
-            len(beside) == 1
-            and not words
-            and (
-                written.get("children") is not None
-                or self._holds_nodes(written.get(beside[0].text))
-            )
-        ):
-            return beside[0]  # with what it holds in the place of 'child'
+        if len(beside) == 1 and not words:
+            has_children = written.get("children") is not None
+            if has_children or self._holds_nodes(written.get(beside[0].text)):
+                return beside[0]  # with what it holds in the place of 'child'
         self._report_no_kind(written, words)
         return None
 

@@ -16,6 +16,7 @@ from bt_actions.document.yaml.source import Source
 __all__ = ["Declared", "Document", "TreeNode"]
 
 
+@dataclass(slots=True, eq=False, repr=False)
 class TreeNode:
     """A node of the tree.
 
@@ -25,36 +26,21 @@ class TreeNode:
     stands for. `is_action` tells whether it sends a goal, also to a server of trees.
     """
 
-    __slots__ = (
-        "alias",
-        "children",
-        "included",
-        "is_action",
-        "key",
-        "kind",
-        "level",
-        "name",
-        "node",
-        "source",
-        "values",
-        "written",
-    )
+    kind: Kind
+    key: Scalar
+    node: Mapping
+    source: Source
+    alias: str | None = None
+    name: str = ""
+    level: int = 1
+    values: dict[str, object] = field(default_factory=dict)
+    written: dict[str, Node] = field(default_factory=dict)
+    children: list[TreeNode] = field(default_factory=list)
+    included: Document | None = None
+    is_action: bool = field(init=False)
 
-    def __init__(
-        self, kind: Kind, key: Scalar, node: Mapping, source: Source, alias: str | None = None
-    ) -> None:
-        self.kind = kind
-        self.is_action = kind.name in ("action", "run_tree")
-        self.level = 1
-        self.key = key
-        self.node = node
-        self.source = source
-        self.alias = alias
-        self.name: str = ""
-        self.values: dict[str, object] = {}
-        self.written: dict[str, Node] = {}
-        self.children: list[TreeNode] = []
-        self.included: Document | None = None
+    def __post_init__(self) -> None:
+        self.is_action = self.kind.name in ("action", "run_tree")
 
     @property
     def place(self) -> Place:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from bt_actions.document.findings import Severity, Span
 from bt_actions.document.findings.rules import RULES
-from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar
+from bt_actions.document.yaml.nodes import Node, Scalar, walk
 from bt_actions.document.yaml.source import Source
 from bt_actions.utilities.suggest import did_you_mean
 
@@ -39,22 +39,8 @@ class Comment(NamedTuple):
 
 
 def scalars_of(root: Node) -> Iterator[Scalar]:
-    """Every scalar below a node, keys too; what an alias repeats comes once."""
-    stack = [root]
-    seen: set[int] = set()
-    while stack:
-        node = stack.pop()
-        if isinstance(node, Scalar):
-            yield node
-        elif id(node) in seen:
-            continue
-        elif isinstance(node, Listing):
-            seen.add(id(node))
-            stack.extend(node.items)
-        elif isinstance(node, Mapping):
-            seen.add(id(node))
-            for key, value in node.pairs:
-                stack += [key, value]
+    """Every scalar of a node, as `walk` gives them."""
+    return (node for node in walk(root) if isinstance(node, Scalar))
 
 
 def content_of(scalar: Scalar, source: Source) -> str:
