@@ -27,8 +27,7 @@ from bt_actions.document.language.keys import (
     TOPIC,
 )
 from bt_actions.document.language.kinds import KINDS, SERVICE_TIMEOUT, Group, Kind
-from bt_actions.document.language.scalars import Text
-from bt_actions.document.language.shape import Shape
+from bt_actions.document.language.scalars import Shape, Text
 from bt_actions.document.language.shapes import Key, Record
 from bt_actions.expressions.functions import ARGUMENTS
 from bt_actions.goals.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Busy

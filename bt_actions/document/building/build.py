@@ -26,8 +26,15 @@ from bt_actions.document.language.bounds import refuse_large
 from bt_actions.document.language.classes import Python
 from bt_actions.document.language.values import computed_in
 from bt_actions.document.reading.inputs import check_inputs
-from bt_actions.document.reading.settings import join_names, settings_of, text_of, writes_of
-from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.tree import (
+    Declared,
+    Document,
+    TreeNode,
+    join_names,
+    settings_of,
+    text_of,
+    writes_of,
+)
 from bt_actions.goals.policy import Retry
 from bt_actions.utilities.shorten import shorten
 

@@ -25,8 +25,7 @@ from bt_actions.document.language.classes import Python
 from bt_actions.document.language.types import parse_type
 from bt_actions.document.language.values import Computed, resolve
 from bt_actions.document.reading.inputs import convert
-from bt_actions.document.reading.settings import join_names, text_of
-from bt_actions.document.reading.tree import Document, TreeNode
+from bt_actions.document.reading.tree import Document, TreeNode, join_names, text_of
 from bt_actions.document.yaml.nodes import Scalar
 from bt_actions.expressions.expression import Expression
 from bt_actions.messages import fields

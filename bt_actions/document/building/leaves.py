@@ -19,8 +19,7 @@ from bt_actions.behaviours.topics import Publish, WaitForMessage
 from bt_actions.document.building.context import Context, plain_name, table_of, written_text
 from bt_actions.document.language.classes import ClassError, make_behaviour, refusal
 from bt_actions.document.language.values import Computed, computed_in, spoken
-from bt_actions.document.reading.settings import server_of, settings_of, text_of
-from bt_actions.document.reading.tree import TreeNode
+from bt_actions.document.reading.tree import TreeNode, server_of, settings_of, text_of
 from bt_actions.document.yaml.nodes import span_of
 from bt_actions.goals.policy import Busy, Retry, Timeouts
 from bt_actions.messages.interfaces import interface

@@ -23,8 +23,7 @@ from bt_actions.document.language.values import (
     computed_in,
     locate,
 )
-from bt_actions.document.reading.settings import merged, settings_of, when_of
-from bt_actions.document.reading.tree import Declared, TreeNode
+from bt_actions.document.reading.tree import Declared, TreeNode, merged, settings_of, when_of
 from bt_actions.document.yaml.nodes import Mapping, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.messages.conversion import Problem, examine

@@ -26,7 +26,6 @@ from bt_actions.document.checking.value_types import (
 )
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
-from bt_actions.document.language.bare import warn_bare_angle, warn_bare_duration
 from bt_actions.document.language.kinds import KINDS, Interface, Kind
 from bt_actions.document.language.types import (
     Either,
@@ -46,9 +45,9 @@ from bt_actions.document.language.values import (
     names_file,
 )
 from bt_actions.document.reading.inputs import refuse_infinite
-from bt_actions.document.reading.settings import Write, when_of, writes_of
-from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.tree import Declared, Document, TreeNode, Write, when_of, writes_of
 from bt_actions.document.reading.unread import Doubts
+from bt_actions.document.yaml.mistaken import warn_bare_angle, warn_bare_duration
 from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.expressions.expression import Expression, ExpressionError

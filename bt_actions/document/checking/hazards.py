@@ -14,8 +14,13 @@ from bt_actions.document.checking.order import find_early_reads
 from bt_actions.document.checking.verdicts import BEGUN, Verdicts
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.language.values import names_value
-from bt_actions.document.reading.settings import resources_below, shared_settings
-from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.tree import (
+    Declared,
+    Document,
+    TreeNode,
+    resources_below,
+    shared_settings,
+)
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
 from bt_actions.document.yaml.nodes import span_of

@@ -14,8 +14,7 @@ from typing import NamedTuple
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.findings import Related
 from bt_actions.document.language.values import Computed, computed_in
-from bt_actions.document.reading.settings import settings_of
-from bt_actions.document.reading.tree import TreeNode
+from bt_actions.document.reading.tree import TreeNode, settings_of
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import span_of
 

@@ -13,8 +13,15 @@ from typing import NamedTuple
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.findings import Place, Related
 from bt_actions.document.language.kinds import Interface
-from bt_actions.document.reading.settings import join_names, server_of, shared_settings, text_of
-from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.tree import (
+    Declared,
+    Document,
+    TreeNode,
+    join_names,
+    server_of,
+    shared_settings,
+    text_of,
+)
 from bt_actions.document.yaml.nodes import Node, span_of
 from bt_actions.messages.interfaces import RUN_TREE
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Mapping, Sequence
 
 from bt_actions.document.language.types import Either, Record
-from bt_actions.document.reading.settings import Write
+from bt_actions.document.reading.tree import Write
 from bt_actions.expressions.functions import KNOWN
 from bt_actions.messages.fields import FLOATS, INTEGERS, FieldType, Listing, Scalar
 

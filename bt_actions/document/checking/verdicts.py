@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from bt_actions.document.language.values import computed_in
-from bt_actions.document.reading.settings import settings_of
-from bt_actions.document.reading.tree import Document, TreeNode
+from bt_actions.document.reading.tree import Document, TreeNode, settings_of
 
 __all__ = ["BEGUN", "Can", "Verdicts"]
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping as MappingType
 
 from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES
 from bt_actions.document.language.kinds import KINDS
-from bt_actions.document.language.shape import Shape
+from bt_actions.document.language.scalars import Shape
 from bt_actions.document.language.shapes import Key, ListOf, OneOf, Record, Table
 from bt_actions.document.yaml.comments import (
     Comment,

@@ -17,11 +17,11 @@ from bt_actions.document.language.scalars import (
     Name,
     Place,
     Quantity,
+    Shape,
     Text,
     TypeName,
     Whole,
 )
-from bt_actions.document.language.shape import Shape
 from bt_actions.document.language.shapes import AnyValue, Key, ListOf, Record, Table, Values
 from bt_actions.goals.policy import RETRYABLE, Busy
 

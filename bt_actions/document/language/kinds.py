@@ -39,11 +39,11 @@ from bt_actions.document.language.scalars import (
     NodeName,
     Place,
     Quantity,
+    Shape,
     Text,
     TypeName,
     Whole,
-)  # fmt: skip
-from bt_actions.document.language.shape import Shape
+)
 from bt_actions.document.language.shapes import (
     AnyValue,
     Key,

@@ -11,8 +11,16 @@ from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
 
 from bt_actions.document.findings.elsewhere import as_mapping, key_here
-from bt_actions.document.language.scalars import Choice, Name, Place
-from bt_actions.document.language.shape import Schema, Shape, is_computed, read_computed, wrong_form
+from bt_actions.document.language.scalars import (
+    Choice,
+    Name,
+    Place,
+    Schema,
+    Shape,
+    is_computed,
+    read_computed,
+    wrong_form,
+)
 from bt_actions.document.language.values import BAD, read_value
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of
 from bt_actions.document.yaml.source import Source

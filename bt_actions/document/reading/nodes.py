@@ -5,25 +5,34 @@ Reports what is wrong as `read.py` does.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping as MappingType
 from itertools import chain
 
 from bt_actions.document.findings import Place, Related
 from bt_actions.document.findings.elsewhere import key_here, kind_here
 from bt_actions.document.language.keys import ACTION_KEYS
-from bt_actions.document.language.kinds import KINDS, Group
-from bt_actions.document.language.scalars import Name
-from bt_actions.document.language.shape import words_for, wrong_form
+from bt_actions.document.language.kinds import KINDS, Group, Interface
+from bt_actions.document.language.scalars import Name, is_computed, words_for, wrong_form
 from bt_actions.document.language.shapes import (
     Key,
     Table,
     report_unknown_key,
 )
+from bt_actions.document.language.types import interface_of
 from bt_actions.document.language.values import BAD
-from bt_actions.document.reading.instead import a_kind, around, fields_for
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.reading.unread import Doubts
-from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of
+from bt_actions.document.yaml.nodes import (
+    Listing,
+    Mapping,
+    Node,
+    Scalar,
+    data_of,
+    span_of,
+    start_of,
+)
+from bt_actions.messages.as_fields import as_fields
 from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
 
 __all__ = ["NODE_KEYS", "read_root"]
@@ -41,6 +50,8 @@ _BESIDE_TYPE = frozenset({"action", *_BESIDE_CHILD})
 _DECORATORS = {kind.name: kind.name for kind in KINDS.values() if kind.group is Group.DECORATOR}
 _DECORATORS |= {key: name for name in _DECORATORS for key in KINDS[name].keys if key != "name"}
 """Which kind a decorator's name, or a key of one, is written for."""
+_LONGEST = 40
+_SIGNS = frozenset(":,{}[]#\n")
 _IN_SEQUENCE = "put a sequence there, and the list into it: {sequence: name, children: [...]}"
 
 
@@ -155,7 +166,7 @@ class _Reader:
             place = Place(self._source.name, first.line, first.column)
             self._source.report(
                 "BT112", span_of(second),
-                f"a node is one thing: this is {a_kind(first.text)} and {a_kind(second.text)}",
+                f"a node is one thing: this is {_a_kind(first.text)} and {_a_kind(second.text)}",
                 hint=self._nested(written, first, second) or "begin a new item with '-'",
                 related=Related(place, "the first is here"),
             )  # fmt: skip
@@ -173,7 +184,7 @@ class _Reader:
         for outer, inner in ((first, second), (second, first)):
             kind = KINDS.get(outer.text)
             if kind is not None and kind.group is Group.DECORATOR:
-                return around(written, outer, inner)
+                return _around(written, outer, inner)
         return None
 
     def _report_no_kind(self, written: Mapping, words: list[Scalar]) -> None:
@@ -241,7 +252,7 @@ class _Reader:
                 written[name] = inner
                 if isinstance(inner, Listing) and interface and name == interface.fields:
                     typed = self._actions[node.alias].node if node.alias else node.node
-                    hint = fields_for(interface, inner, typed)
+                    hint = _fields_for(interface, inner, typed)
                     value = wrong_form(known.shape, inner, source, hint=hint)
                 else:
                     value = known.shape.read(inner, source)
@@ -327,7 +338,7 @@ class _Reader:
         else:
             hint = None
             if (near := _decorator_of(key.text, keys)) and near not in keys:
-                hint = around(node.node, key, node.key, near)
+                hint = _around(node.node, key, node.key, near)
             if key.text == "name" and "name" not in keys:
                 hint = f"the name stands behind '{node.key.text}:'"
             report_unknown_key(key, keys, self._source, hint)
@@ -360,3 +371,50 @@ def _decorator_of(word: str, keys: MappingType[str, Key]) -> str | None:
     if word in _DECORATORS or closest(word, keys) or any(key_here(word, keys)):
         return _DECORATORS.get(word)
     return closest(word, (*_BESIDE_CHILD, "repeat"))
+
+
+def _around(written: Mapping, outer: Scalar, inner: Scalar, decorator: str = "") -> str:
+    """Put a decorator around a node: `outer` and `inner` are the two keys of what was written.
+
+    `decorator` is the kind that is meant, where `outer` is one of its keys, or looks like its name.
+    """
+    decorator = decorator or outer.text
+    keys, setting = KINDS[decorator].keys, KINDS[decorator].reads
+    said = _text(written.get(decorator))
+    if said == "..." and outer.text not in keys:
+        said = _text(written.get(outer.text))
+    name = _text(written.get(inner.text))
+    parts = [f"{decorator}: {said if decorator == 'while' else name}"]
+    if setting in keys:  # how often, or how long
+        given = _text(written.get(setting))
+        if given == "..." and said[:1].isdigit():
+            given = said
+        parts.append(f"{setting}: {keys[setting].example if given == '...' else given}")
+    own = {key: _text(written.get(key)) for key in keys if key != setting}
+    parts += [f"{key}: {given}" for key, given in own.items() if key != "name" and given != "..."]
+    parts.append(f"child: {{{inner.text}: {name}, ...}}")
+    return f"{_a_kind(decorator)} goes around the node: {{{', '.join(parts)}}}"
+
+
+def _a_kind(word: str) -> str:
+    """Return ``a 'retry'``, ``an 'invert'``."""
+    return f"{'an' if word[0] in 'aeiou' else 'a'} {word!r}"
+
+
+def _text(node: Node | None) -> str:
+    """A short scalar as it is, if it can stand in braces so; dots for anything else."""
+    said = node.text if isinstance(node, Scalar) else ""
+    return said if 0 < len(said) <= _LONGEST and _SIGNS.isdisjoint(said) else "..."
+
+
+def _fields_for(interface: Interface, inner: Listing, typed: Node) -> str | None:
+    """Return a hint for a list in the place of fields; `typed` holds the interface's type."""
+    named = typed.get("type") if isinstance(typed, Mapping) else None
+    if not isinstance(named, Scalar):
+        return None
+    with contextlib.suppress(ValueError):  # TypeNameError is one
+        cls = interface_of(named.text, interface.kind)
+        data = [None if is_computed(each) else data_of(each) for each in inner.items]
+        instead = as_fields(interface.sent_by(cls), data)
+        return f"write {instead}" if instead else None
+    return None

@@ -12,7 +12,7 @@ from bt_actions.document.findings import Span
 from bt_actions.document.findings.elsewhere import key_here
 from bt_actions.document.language.keys import DEFAULTS, LIBRARY_KEYS, TOP_KEYS
 from bt_actions.document.language.kinds import KINDS
-from bt_actions.document.language.shape import words_for
+from bt_actions.document.language.scalars import words_for
 from bt_actions.document.language.shapes import Key, read_keys
 from bt_actions.document.language.values import BAD
 from bt_actions.document.reading.nodes import NODE_KEYS

@@ -16,8 +16,7 @@ from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.reading.find import TreeNotFoundError, find_tree, is_file
 from bt_actions.document.reading.nodes import read_root
 from bt_actions.document.reading.read import read_document
-from bt_actions.document.reading.settings import merged
-from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.tree import Declared, Document, TreeNode, merged
 from bt_actions.document.yaml.nodes import Listing, Node, span_of
 from bt_actions.document.yaml.source import SUFFIXES, Source, absolute, read_source
 

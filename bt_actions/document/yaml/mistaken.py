@@ -1,8 +1,8 @@
-"""What YAML reads in another way than it looks.
+"""What is read in another way than it is likely to be meant.
 
 ``Part #3`` is the text ``Part`` and a comment; where a space follows the '#' a comment was meant,
 nobody can tell more. In ``“map”`` the quotes are a part of the text. ``{x}`` is a mapping of x to
-nothing, where a variable or a word was meant.
+nothing, where a variable or a word was meant. ``5000`` are seconds.
 """
 
 from __future__ import annotations
@@ -10,8 +10,21 @@ from __future__ import annotations
 from bt_actions.document.findings import Span
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source, unquoted
+from bt_actions.utilities.units import TURN, spoken_duration
 
-__all__ = ["cut_hint", "report_braces", "warn_cut", "warn_quotes"]
+__all__ = [
+    "cut_hint",
+    "report_braces",
+    "warn_bare_angle",
+    "warn_bare_duration",
+    "warn_cut",
+    "warn_quotes",
+]
+
+_LONGEST = 40
+"""Characters of a number in a message."""
+_LONG = 500.0
+"""Seconds that somebody would rather give in minutes."""
 
 
 def warn_cut(node: Scalar, source: Source, what: str) -> None:
@@ -64,3 +77,27 @@ def report_braces(node: Node, source: Source) -> bool:
     hint = f"leave the braces away, or write ${key.text} for a variable"
     source.report("BT117", span_of(node), f"{{{key.text}}} is read as a mapping", hint=hint)
     return True
+
+
+def warn_bare_duration(node: Scalar, seconds: float, source: Source) -> None:
+    """Warn of so many seconds that milliseconds are likely to be meant."""
+    if abs(seconds) >= _LONG:
+        said = "is {} s = " + spoken_duration(seconds)
+        _warn_bare(node, source, "BT317", said, "for milliseconds write {0} ms, else {0} s")
+
+
+def warn_bare_angle(node: Scalar, radians: float, source: Source) -> None:
+    """Warn of an angle beyond a full turn: degrees are likely to be meant."""
+    if abs(radians) > TURN:
+        _warn_bare(
+            node, source, "BT318", "is in radians", "for degrees write {0} deg, else {0} rad"
+        )
+
+
+def _warn_bare(node: Scalar, source: Source, code: str, said: str, hint: str) -> None:
+    text = node.text.strip()
+    if text[-1].isalpha():  # a unit
+        return
+    text = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
+    message = f"{text} without a unit {said.format(text)}"
+    source.report(code, span_of(node), message, hint=hint.format(text))
