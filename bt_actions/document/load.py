@@ -21,8 +21,8 @@ from bt_actions.document.reading.inputs import TreeInput, check_inputs, inputs_o
 from bt_actions.document.reading.tree import Document
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.reading.workspace import Workspace
-from bt_actions.document.yaml.comments import apply_ignores
 from bt_actions.document.yaml.source import Source, TooManyErrors
+from bt_actions.document.yaml.written import apply_ignores
 from bt_actions.utilities.plain_data import plain
 
 if TYPE_CHECKING:
@@ -273,9 +273,8 @@ def _checked(workspace: Workspace, *, types: bool, python: Python = True) -> lis
         with contextlib.suppress(TooManyErrors):  # which are errors of this document: it is refused
             checker = Checker(document, types=types, python=python)
             check_document(checker)
-            doubts = Doubts(document)  # anew: the checker found more
-            find_hazards(checker, doubts)
-            apply_ignores(document.source, partial(_all_tried, document, doubts))
+            find_hazards(checker)
+            apply_ignores(document.source, partial(_all_tried, document, checker.doubts))
     return workspace.findings
 
 

@@ -20,10 +20,9 @@ from py_trees.blackboard import Blackboard
 
 from bt_actions.behaviours.reading import Formula, Names
 from bt_actions.behaviours.topics import TopicValue
-from bt_actions.document.language.bounds import refuse_large
 from bt_actions.document.language.classes import Python
 from bt_actions.document.language.types import parse_type
-from bt_actions.document.language.values import Computed, resolve
+from bt_actions.document.language.values import Computed, refuse_large, resolve
 from bt_actions.document.reading.inputs import convert
 from bt_actions.document.reading.tree import Document, TreeNode, join_names, text_of
 from bt_actions.document.yaml.nodes import Scalar

@@ -9,8 +9,7 @@ import itertools
 from collections.abc import Iterator, Mapping
 
 from bt_actions.document.checking.checker import Checker
-from bt_actions.document.checking.missing import find_missing
-from bt_actions.document.checking.order import find_early_reads
+from bt_actions.document.checking.reads import find_early_reads, find_missing
 from bt_actions.document.checking.verdicts import BEGUN, Verdicts
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.language.values import names_value
@@ -32,18 +31,17 @@ _LOOPED = ("as", "index")
 """What a loop writes for those who want to read it."""
 
 
-def find_hazards(checker: Checker, doubts: Doubts) -> None:
+def find_hazards(checker: Checker) -> None:
     """Report the hazards of a document that was checked, but for those that are not certain."""
-    document = checker.document
-    if document.root is None:
-        return
-    _Hazards(checker, doubts).look(document.root)
+    checker.doubts = Doubts(checker.document)  # anew: the checker found more
+    if checker.document.root is not None:
+        _Hazards(checker).look(checker.document.root)
 
 
 class _Hazards:
-    def __init__(self, checker: Checker, doubts: Doubts) -> None:
+    def __init__(self, checker: Checker) -> None:
         self._checker = checker
-        self._doubts = doubts
+        self._doubts = checker.doubts
         self._document: Document = checker.document
         self._source = checker.source
         self._verdicts = Verdicts()
@@ -60,8 +58,8 @@ class _Hazards:
     def look(self, root: TreeNode) -> None:
         self._walk(root, bounded=False)
         self._result_timeouts()
-        find_early_reads(self._checker, self._doubts, root)
-        find_missing(self._checker, self._doubts, root)
+        find_early_reads(self._checker, root)
+        find_missing(self._checker, root)
         self._unused()
 
     def _report(self, code: str, span: Span, message: str, **more: object) -> None:
@@ -259,7 +257,7 @@ class _Hazards:
             other = given.get(write.name)
             if other is not None:
                 self._report(
-                    "BT312", span_of(write.written),
+                    "BT312", span_of(node.written.get(write.under, node.key)),
                     f"${write.name} already stands for something else here",
                     related=Related(other.place, "for this"),
                     hint="as: another name",

@@ -9,9 +9,9 @@ import re
 from collections.abc import Container
 
 from bt_actions.document.language.values import computes, names_file, names_value
-from bt_actions.document.yaml.inner import inner_span
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
+from bt_actions.document.yaml.written import inner_span
 
 __all__ = ["marked_here", "warn_unmarked"]
 

@@ -100,30 +100,23 @@ def _escaped(text: str, more: str) -> str:
 
 
 def _sarif_result(finding: Finding, used: list[str]) -> dict[str, object]:
+    region = {
+        "startLine": finding.line,
+        "startColumn": finding.column,
+        "endLine": finding.end_line,
+        "endColumn": finding.end_column,
+    }
     result: dict[str, object] = {
         "ruleId": finding.code,
         "ruleIndex": used.index(finding.code),
         "level": finding.severity.value,
         "message": {"text": _with_hint(finding)},
-        "locations": [
-            _sarif_place(
-                finding.file,
-                {
-                    "startLine": finding.line,
-                    "startColumn": finding.column,
-                    "endLine": finding.end_line,
-                    "endColumn": finding.end_column,
-                },
-            )
-        ],
+        "locations": [_sarif_place(finding.file, region)],
     }
     if finding.related is not None:
-        place = finding.related.place
+        place, message = finding.related.place, {"text": finding.related.message}
         region = {"startLine": place.line, "startColumn": place.column}
-        related = _sarif_place(place.file, region)
-        result["relatedLocations"] = [
-            {**related, "message": {"text": finding.related.message}},
-        ]
+        result["relatedLocations"] = [{**_sarif_place(place.file, region), "message": message}]
     return result
 
 

@@ -208,14 +208,9 @@ def _all() -> Iterable[Kind]:
         "Stops its child after some time, and fails when what it stopped has ended, or did not end "
         "within its own 'cancel'.",
         "timeout: Ten seconds at most\nafter: 10 s\nchild:\n  success: Search",
-        Key(
-            "after",
-            Duration(values=True),
-            "How long the child may take.",
-            required=True,
-            example="10 s",
-        ),
-    )
+        Key("after", Duration(values=True), "How long the child may take.", required=True,
+            example="10 s"),
+    )  # fmt: skip
     yield _decorator(
         "invert", "Succeeds when its child fails, and fails when it succeeds.",
         "invert: Nobody there\nchild:\n  failure: Somebody",
@@ -291,20 +286,10 @@ def _all() -> Iterable[Kind]:
         "Calls a service.",
         "service: Switch the light on\ntype: std_srvs/srv/SetBool\nserver: light\n"
         "request: {data: true}\nexpect: result.success",
-        Key(
-            "type",
-            TypeName("srv"),
-            "The service's type.",
-            required=True,
-            example="std_srvs/srv/SetBool",
-        ),
-        Key(
-            "server",
-            RosName("the name of a service"),
-            "The service.",
-            required=True,
-            example="light",
-        ),
+        Key("type", TypeName("srv"), "The service's type.", required=True,
+            example="std_srvs/srv/SetBool"),
+        Key("server", RosName("the name of a service"), "The service.", required=True,
+            example="light"),
         Key("request", Values(), "The fields of the request."),
         Key("timeout", SERVICE_TIMEOUT, "How long to wait; a bare duration is the answer's."),
         Key("retry", SERVICE_RETRY, "How often to try; a bare number is the attempts."),
@@ -312,7 +297,7 @@ def _all() -> Iterable[Kind]:
         Key("save", Table(Place(RESULT)), "Names to keep parts of the answer under."),
         Key("namespace", NAMESPACE, "Put before a relative name."),
         interface=Interface("srv", "server", "request", "Request", "result", "Response"),
-    )
+    )  # fmt: skip
     yield _leaf(
         "publish",
         TOPIC_NAME,
@@ -321,22 +306,14 @@ def _all() -> Iterable[Kind]:
         "publish: lamp\ntype: std_msgs/msg/Bool\nmessage: {data: true}",
         MESSAGE_TYPE,
         Key("message", Values(), "The fields of the message."),
-        Key(
-            "subscribers",
-            Whole(1),
-            "So many must listen before it publishes.",
-            default="whoever is there",
-        ),
-        Key(
-            "timeout",
-            Duration(or_none=True),
-            "After which it fails where fewer listen; not while a process is new.",
-            default="none",
-        ),
+        Key("subscribers", Whole(1), "So many must listen before it publishes.",
+            default="whoever is there"),
+        Key("timeout", Duration(or_none=True), default="none",
+            doc="After which it fails where fewer listen; not while a process is new."),
         Key("qos", QOS, "How it is published.", default="default"),
         Key("namespace", NAMESPACE, "Put before a relative name."),
         interface=Interface("msg", "publish", "message"),
-    )
+    )  # fmt: skip
     yield _leaf(
         "wait_for_message",
         NodeName(),
@@ -373,14 +350,10 @@ def _all() -> Iterable[Kind]:
         Text(values=True),
         "Writes a line to the log. It never fails: `(no value)` stands for what has none.",
         "log: The level is $(level)\nlevel: warn",
-        Key(
-            "level",
-            Choice(("debug", "info", "warn", "error", "fatal")),
-            "How grave it is.",
-            default="info",
-        ),
+        Key("level", Choice(("debug", "info", "warn", "error", "fatal")), "How grave it is.",
+            default="info"),
         reads="",  # it never fails
-    )
+    )  # fmt: skip
     yield _leaf(
         "python",
         Text("a class, such as package.module.Class, as a text"),

@@ -50,37 +50,29 @@ class AnyValue:
 
 @dataclass(frozen=True, slots=True)
 class Values:
-    """A mapping of fields (or names) to values, with `$name` in them."""
+    """A mapping of fields (or names) to values, with `$name` in them, or `$name` for one."""
 
     words: str = "a mapping of fields to values"
+    form: type[Node] = Mapping
 
     def read(self, node: Node, source: Source) -> object:
         if is_computed(node):
             return read_computed(self, node, source)
-        if not isinstance(node, Mapping):
-            hint = as_mapping(node.text) if isinstance(node, Scalar) else None
-            return wrong_form(self, node, source, hint=hint)
-        return read_value(node, source)
+        if isinstance(node, self.form):
+            return read_value(node, source)
+        meant = isinstance(node, Scalar) and self.form is Mapping and as_mapping(node.text)
+        return wrong_form(self, node, source, hint=meant or None)
 
     def schema(self) -> Schema:
-        return {"type": ["object", "string"]}
+        return {"type": ["object" if self.form is Mapping else "array", "string"]}
 
 
 @dataclass(frozen=True, slots=True)
-class ListValue:
+class ListValue(Values):
     """A list of any values, or `$name` for one."""
 
     words: str = "a list"
-
-    def read(self, node: Node, source: Source) -> object:
-        if is_computed(node):
-            return read_computed(self, node, source)
-        if isinstance(node, Listing):
-            return read_value(node, source)
-        return wrong_form(self, node, source)
-
-    def schema(self) -> Schema:
-        return {"type": ["array", "string"]}
+    form: type[Node] = Listing
 
 
 @dataclass(frozen=True, slots=True)

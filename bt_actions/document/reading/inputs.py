@@ -9,10 +9,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from bt_actions.document.language.bounds import refuse_large
 from bt_actions.document.language.types import parse_type
-from bt_actions.document.language.values import names_file, read_data, read_value, resolve
-from bt_actions.document.reading.tree import Declared, Document
+from bt_actions.document.language.values import (
+    names_file,
+    read_data,
+    read_value,
+    refuse_large,
+    resolve,
+)
+from bt_actions.document.reading.tree import Document
 from bt_actions.document.yaml.compose import compose
 from bt_actions.document.yaml.source import Source, TooManyErrors
 from bt_actions.messages.fields import Message, Scalar
@@ -53,7 +58,17 @@ class TreeInput:
 
 def inputs_of(document: Document) -> dict[str, TreeInput]:
     """What a tree wants to be given."""
-    return {name: _input(declared) for name, declared in document.inputs.items()}
+    return {
+        name: TreeInput(
+            name,
+            str(declared.values.get("type", "")),
+            "default" not in declared.values,
+            declared.values.get("default"),
+            str(declared.values.get("unit", "")),
+            str(declared.values.get("description", "")),
+        )
+        for name, declared in document.inputs.items()
+    }
 
 
 def check_inputs(
@@ -149,15 +164,3 @@ def _fit(document: Document, name: str, value: object, text: str, *, types: bool
         return convert(value, text, types=types)
     except ValueError as error:
         raise InputError(f"input {name!r} of {document.name!r}: {error}") from None
-
-
-def _input(declared: Declared) -> TreeInput:
-    values = declared.values
-    return TreeInput(
-        declared.name,
-        str(values.get("type", "")),
-        "default" not in values,
-        values.get("default"),
-        str(values.get("unit", "")),
-        str(values.get("description", "")),
-    )

@@ -113,6 +113,9 @@ class Document:
     """What each alias (None: no alias) has where a node says nothing; made when first asked for."""
     root: TreeNode | None = None
     imported: list[Document] = field(default_factory=list)
+    size: int = 0
+    height: int = 0
+    """How many nodes the tree has, and on how many levels, with all that it includes."""
     _nodes: tuple[TreeNode, ...] = ()
 
     @property
@@ -238,14 +241,6 @@ class Write:
     """The key of the node that says so; none where the action's declaration does."""
     value: object
     root: str | None = None
-
-    @property
-    def written(self) -> Node:
-        """What says so; the node itself, where its action's declaration does."""
-        node, table = self.node, self.node.written.get(self.under)
-        if isinstance(table, Mapping):
-            return table.get(self.name) or node.node
-        return node.node if not self.under else table or node.key
 
     @property
     def depends(self) -> bool:

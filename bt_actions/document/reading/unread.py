@@ -11,9 +11,9 @@ from bisect import bisect_left
 from functools import cached_property
 
 from bt_actions.document.reading.tree import Document, TreeNode
-from bt_actions.document.yaml.comments import scalars_of
 from bt_actions.document.yaml.nodes import Node
 from bt_actions.document.yaml.source import Source
+from bt_actions.document.yaml.written import scalars_of
 
 __all__ = ["Doubts"]
 

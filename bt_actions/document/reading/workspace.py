@@ -44,8 +44,6 @@ class Workspace:
             self._within = tuple(folder for both in ways for folder in both)
         self._documents: dict[tuple[Path, bool], Document | None] = {}
         self._sources: list[Source] = []
-        self._sizes: dict[int, int] = {}
-        self._heights: dict[int, int] = {}
         self._failed: dict[Path, DocumentError] = {}
         self._keys: dict[Path, Path] = {}
 
@@ -118,8 +116,8 @@ class Workspace:
             if node.kind is _SUBTREE:
                 node.included = self._include(node, chain)
                 if node.included is not None:
-                    size += self._sizes.get(id(node.included), 0)
-                    below = node.level + self._heights.get(id(node.included), 0)
+                    size += node.included.size
+                    below = node.level + node.included.height
                     if below > MAX_LEVELS:
                         message = f"the tree unfolds to more than {MAX_LEVELS} levels of nodes"
                         source.report("BT105", span_of(node.key), message)
@@ -130,8 +128,7 @@ class Workspace:
                     message = f"the tree unfolds to more than {MAX_TREE_NODES:,} nodes"
                     source.report("BT105", span_of(node.key), message)
                     break
-        self._sizes[id(document)] = min(size, MAX_TREE_NODES + 1)
-        self._heights[id(document)] = height
+        document.size, document.height = min(size, MAX_TREE_NODES + 1), height
         return document
 
     def _include(self, node: TreeNode, chain: tuple[Path, ...]) -> Document | None:

@@ -92,7 +92,7 @@ class _Composer:
         self._source = source
         self._restores = text is not source.text
         self._events = chain(
-            starmap(parser.get_event, repeat((), MAX_NODES)), _beyond(source, parser.get_event)
+            starmap(parser.get_event, repeat((), MAX_NODES)), self._beyond(parser.get_event)
         )
         self._unfold = unfold
         self.anchored: dict[int, str] = {}
@@ -123,7 +123,13 @@ class _Composer:
         self._source.report(code, _event_span(event), message)
 
     def _give_up(self, code: str, event: Any, message: str) -> NoReturn:
-        _give_up(self._source, code, event, message)
+        self._report(code, event, message)
+        raise _GaveUp
+
+    def _beyond(self, get_event: Callable[[], Any]) -> Iterator[Any]:
+        """What comes after `MAX_NODES` events."""
+        self._give_up("BT105", get_event(), _TOO_LARGE)
+        yield
 
     def _scalar(self, event: Any) -> Scalar:
         node = Scalar()
@@ -280,17 +286,6 @@ _TAKES: dict[type, Callable[[_Composer, Any], Node]] = {
     ListingStartEvent: _Composer._listing,  # noqa: SLF001
     AliasEvent: _Composer._alias,  # noqa: SLF001
 }
-
-
-def _beyond(source: Source, get_event: Callable[[], Any]) -> Iterator[Any]:
-    """What comes after `MAX_NODES` events."""
-    _give_up(source, "BT105", get_event(), _TOO_LARGE)
-    yield
-
-
-def _give_up(source: Source, code: str, event: Any, message: str) -> NoReturn:
-    source.report(code, _event_span(event), message)
-    raise _GaveUp
 
 
 def _braced(node: Node) -> str | None:

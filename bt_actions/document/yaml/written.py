@@ -1,8 +1,9 @@
-"""Where the comments of a text are. A '#' that stands in a text of the document begins none.
+"""Where comments are, and where the characters of a scalar's text are written.
 
 Asks what was composed, so that it agrees with libyaml: a '#' is a comment's wherever it stands in
-no scalar. ``# bt: ignore[BT301] reason`` silences a warning: on the line of what it silences, or
-alone on a line above it.
+no scalar, and a part of a scalar is where libyaml's text is found in what was written.
+``# bt: ignore[BT301] reason`` silences a warning: on the line of what it silences, or alone on a
+line above it.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from typing import NamedTuple
 
 from bt_actions.document.findings import Severity, Span
 from bt_actions.document.findings.rules import RULES
-from bt_actions.document.yaml.nodes import Node, Scalar, walk
-from bt_actions.document.yaml.source import Source
+from bt_actions.document.yaml.nodes import Node, Scalar, span_of, walk
+from bt_actions.document.yaml.source import Char, Source
 from bt_actions.utilities.suggest import did_you_mean
 
 __all__ = [
-    "Comment", "apply_ignores", "block_header", "comments_of", "content_of", "is_ignore",
+    "Comment", "apply_ignores", "block_header", "comments_of", "inner_span", "is_ignore",
     "scalars_of",
 ]  # fmt: skip
 
@@ -27,6 +28,11 @@ _LATER = (float("inf"), 0.0)
 _PROPERTY = re.compile(r"[&!]\S*\s+")
 _IGNORE = re.compile(r"(?:^|(?<=\s))#\s*bt:\s*ignore\b(?:\[([^\]]*)\])?")
 _CODE = re.compile(r"[^\s,]+")
+_ESCAPE = re.compile(
+    r"\\(?:u([Dd][89ABab]..)\\u([Dd][C-Fc-f]..)"
+    r"|x([0-9A-Fa-f]{2})|u([0-9A-Fa-f]{4})|U([0-9A-Fa-f]{8})|(.))"
+)
+_SHORT = {'"': '"', "\\": "\\", "/": "/", " ": " ", "n": "\n", "t": "\t", "r": "\r", "0": "\0"}
 
 
 class Comment(NamedTuple):
@@ -43,7 +49,7 @@ def scalars_of(root: Node) -> Iterator[Scalar]:
     return (node for node in walk(root) if isinstance(node, Scalar))
 
 
-def content_of(scalar: Scalar, source: Source) -> str:
+def _content_of(scalar: Scalar, source: Source) -> str:
     """What is written on the first line of a scalar, behind its anchor and its tag."""
     written = (source.line(scalar.line) or "")[scalar.column - 1 :]
     while (match := _PROPERTY.match(written)) is not None:
@@ -53,7 +59,7 @@ def content_of(scalar: Scalar, source: Source) -> str:
 
 def block_header(scalar: Scalar, source: Source) -> str:
     """``|`` or ``>-`` and the like, where a scalar is a block; else nothing."""
-    written = "" if scalar.plain else content_of(scalar, source)
+    written = "" if scalar.plain else _content_of(scalar, source)
     return written.split(" ")[0].split("\t")[0] if written[:1] in ("|", ">") else ""
 
 
@@ -160,3 +166,64 @@ def _can_be_silenced(source: Source, code: str, span: Span) -> bool:
     else:
         return True
     return False
+
+
+def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
+    """The range of a part of a scalar's text; the whole scalar where that cannot be told."""
+    chars = _decoded(node, source)
+    if not chars:
+        return span_of(node)
+    if start >= len(chars):  # what is missing would stand behind it
+        _, line, column = chars[-1]
+        return Span(line, column + 1, line, column + 2)
+    last = min(max(end, start + 1), len(chars)) - 1
+    _, line, column = chars[start]
+    _, end_line, end_column = chars[last]
+    behind = chars[last + 1] if last + 1 < len(chars) else None
+    width = behind[2] - end_column if behind is not None and behind[1] == end_line else 1
+    return Span(line, column, end_line, end_column + max(width, 1))
+
+
+def _decoded(node: Scalar, source: Source) -> list[Char]:
+    """The characters of a text as they are written, or none where that cannot be told."""
+    if source.decoded is None or source.decoded[0] is not node:
+        source.decoded = node, _found(node, source)
+    return source.decoded[1]
+
+
+def _found(node: Scalar, source: Source) -> list[Char]:
+    """The characters of a text, looked for one after the other in what was written.
+
+    What is passed over is indentation, the second of two quotes, and whatever else says nothing. A
+    line break may stand for a space.
+    """
+    found: list[Char] = []
+    content = _content_of(node, source)
+    line, at = node.line, len(source.line(node.line) or "") - len(content)
+    if block_header(node, source):
+        line, at = line + 1, 0
+    elif content[:1] in ("'", '"'):
+        at += 1
+    escapes = content.startswith('"')
+    for char in node.text:
+        while line <= node.end_line:
+            written = source.line(line) or ""
+            escape = _ESCAPE.match(written, at) if escapes else None
+            there = _said(escape) if escape else (written[at : at + 1] or "\n")
+            found.append((char, line, at + 1))
+            at = escape.end() if escape else at + 1
+            if at > len(written):
+                line, at = line + 1, 0
+            if there == char or (there == "\n" and char == " "):
+                break
+            found.pop()
+        else:
+            return [] if node.text[len(found) :].strip("\n ") else found
+    return found
+
+
+def _said(escape: re.Match[str]) -> str:
+    if escape[1]:
+        return bytes.fromhex(escape[1] + escape[2]).decode("utf-16-be")
+    code = escape[3] or escape[4] or escape[5]
+    return chr(int(code, 16)) if code else _SHORT.get(escape[6], "")
