@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from bt_actions.ros.log import Log
     from bt_actions.ros.spinning import Spinner
 
-__all__ = ["backend_of", "ended_by_signals", "log", "spinner"]
-
 
 def backend_of(node: Any) -> Backend:
     """Return what a node gives; what is a Backend itself is returned as it is.

@@ -93,23 +93,12 @@ BY_OURSELVES = {
     "ActionBehaviour.open_handles",
     "Retry.pause",
     "TreeRunner.catch_up",
-    "ScriptedServer.begin",
-    "ScriptedServer.failure",
-    "ScriptedServer.feedback",
-    "ScriptedServer.refusal",
-    "ScriptedServer.result",
-    "VirtualBackend.log",
-    "VirtualBackend.publisher",
-    "VirtualBackend.service",
-    "VirtualBackend.subscription",
-    "VirtualNetwork.expand",
     "VirtualNetwork.publish",
-    "VirtualNetwork.serve",
     "VirtualNetwork.service",
-    "VirtualNetwork.timer",
     "VirtualNetwork.topic",
 }
-"""Public because other parts call them, and of no use to who uses the library."""
+"""Public because other parts call them, and of no use to users of the library. Nor is a method
+without a docstring: a protocol, or a base class, describes that one."""
 
 
 def prose(thing: Any) -> str:
@@ -182,7 +171,8 @@ def members(kind: type) -> str:
     parts = []
     for name, member in vars(kind).items():
         by_py_trees = issubclass(kind, Behaviour) and name in BY_PY_TREES
-        if name.startswith("_") or by_py_trees or f"{kind.__name__}.{name}" in BY_OURSELVES:
+        said_elsewhere = by_py_trees or not member.__doc__
+        if name.startswith("_") or said_elsewhere or f"{kind.__name__}.{name}" in BY_OURSELVES:
             continue
         if isinstance(member, property):
             parts.append(f"- **`{name}`**: {item(member)}")

@@ -17,7 +17,7 @@ ROOT = Path(bt_actions.__file__).parent
 ROOMS = [
     {"cli"},
     {"serving", "testing"},
-    {"packages", "render", "recovery", "running", "simulation"},
+    {"render", "recovery", "running", "simulation"},
     {"document"},
     {"behaviours"},
     {"wiring"},
@@ -25,7 +25,7 @@ ROOMS = [
     {"traffic"},
     {"messages", "expressions", "servers"},
     {"events"},
-    {"goals"},
+    {"goals", "packages"},
     {"utilities"},
 ]
 """From above to below: a room imports from the rows below its own, never from beside or above."""

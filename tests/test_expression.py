@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bt_actions.expressions.expression import MAX_LENGTH, Expression, ExpressionError
+from bt_actions.expressions.expression import MAX_LENGTH, Expression
+from bt_actions.expressions.text import ExpressionError
 
 RESULT = SimpleNamespace(
     stalled=True,
@@ -59,6 +60,7 @@ def value(text: str) -> object:
         ("$a < 2 < $b", True),
         ("$a + 1", 2),
         ("$a+$b*2", 6.0),
+        ("$a +\n\t$b", 3.5),
         ("-$a ** 2", -1),
         ("2 ** -1", 0.5),
         ("7 // 2 + 7 % 4", 6),
@@ -255,6 +257,7 @@ def test_what_is_no_expression_is_refused_with_its_place(
         ("max(3)", "max() of one value needs a list, not 3", (0, 6)),
         ("max(1, 'a')", "max() is of numbers alone, or of texts alone", (0, 11)),
         ("abs('a')", "a number is needed, not 'a'", (0, 8)),
+        ("'größer' + abs('ß')", "a number is needed, not 'ß'", (11, 19)),
         ("result.nothing", None, (0, 14)),
     ],
 )
@@ -276,7 +279,7 @@ def test_a_condition_is_true_or_false_and_nothing_else() -> None:
 
 def test_it_tells_the_variables_it_reads_with_their_places() -> None:
     expression = Expression("$a.x + $list.0 > len($a)")
-    assert expression.names == {"a", "list"}
+    assert set(expression.variables) == {"a", "list"}
     assert expression.variable_spans == (("a", (0, 2)), ("list", (7, 12)), ("a", (21, 23)))
 
 

@@ -1,6 +1,6 @@
 """A py_trees leaf that sends a goal to a ROS action and stays RUNNING until it stands.
 
-It keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
+The leaf keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
 shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
 goals/ decides what happens to the goal; here stand the visit to the leaf and its attempts.
 """
@@ -36,7 +36,7 @@ _PLAIN = {bool, int, float, str}
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """What an action is doing at this moment."""
+    """The work of an action at this moment."""
 
     state: str
     """A goal's state, or IDLE before the first visit, BACKOFF between two attempts."""
@@ -209,7 +209,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         return backend.traffic.endpoint(self.action_type, self.action_name)
 
     def initialise(self) -> None:
-        """Begin a visit. What an earlier one left behind is drained beside it."""
+        """Begin a visit. Goals that an earlier visit left behind are drained beside it."""
         backend, _ = self._there()
         ActionBehaviour.terminate(self, Status.INVALID)  # where the first tick of a visit broke off
         self._attempts = Attempts(self.retry, self._reading.when)
@@ -292,19 +292,19 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     # What a leaf for actions of one type may know better
 
     def names(self, result: Any) -> Mapping[str, object]:
-        """What expressions may name, of a result; of None, with any value."""
+        """Return what expressions may name, of a result; of None, with any value."""
         return {"result": result}
 
     def settles(self, result: Any) -> bool:
-        """Whether a result says that nothing the goal began still runs; else its end is UNKNOWN.
+        """Return whether nothing the goal began still runs, by its result; else its end is UNKNOWN.
 
         Asked with None where the goal was aborted, and its result was lost. Called under the lock
-        of all goals: it looks at the result, and does nothing else.
+        of all goals: look at the result, and do nothing else.
         """
         return True
 
     def explain(self, outcome: Outcome, result: Any) -> str:
-        """What to add to the reason of a goal that has not succeeded, or nothing."""
+        """Return what to add to the reason of a goal that has not succeeded, or nothing."""
         told = outcome is Outcome.ABORTED and result is not None
         return f"its result is: {shorten(result)}" if told else ""
 
@@ -325,16 +325,16 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         return self._handle
 
     def _is_over(self) -> bool:
-        """Whether code of the user's has ended the visit: stopped this leaf, or shut it down."""
+        """Return whether the user's code has ended the visit: by stop, or by shutdown."""
         return self._outcome is not None or self._backend is None
 
     def _filed(self, handle: GoalHandle) -> bool:
-        """Whether this attempt is over and in the history."""
+        """Return whether this attempt is over and in the history."""
         history = self.history  # a new visit begins a new one
         return bool(history) and history[-1].goal is handle.goal
 
     def _is_plain(self) -> bool:
-        """Whether no code of the user's can run where the goal is made into a message."""
+        """Return whether no code of the user's can run where the goal is made into a message."""
         goal = self.goal
         return type(goal) is dict and all(type(each) in _PLAIN for each in goal.values())
 

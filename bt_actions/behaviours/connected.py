@@ -1,4 +1,4 @@
-"""What leaves have in common: the Backend of their node, time that runs out, and how they fail."""
+"""Common parts of leaves: the Backend of their node, time that runs out, and failure."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Stopwatch:
         self._now, self._passed, self._seen = now, 0.0, now()
 
     def passed(self) -> float:
-        """The seconds until now."""
+        """Return the seconds until now."""
         now = self._now()
         self._passed += max(0.0, now - self._seen)
         self._seen = now
@@ -85,11 +85,11 @@ class Timed(Behaviour):
         self._watch = Stopwatch(self._now)
 
     def left(self) -> float:
-        """The seconds that remain; zero when they have run out."""
+        """Return the seconds that remain; zero when they have run out."""
         return self._seconds and max(0.0, self._seconds - self._watch.passed())
 
     def due_in(self) -> float | None:
-        """Seconds until it needs a tick though nothing has happened."""
+        """Return the seconds until it needs a tick though nothing has happened."""
         return self.left()
 
     def _now(self) -> float:

@@ -34,14 +34,14 @@ class Gate(Timed, Decorator):
     """Whether it failed by itself: its child did not, or was not ticked this time."""
 
     def gate(self) -> Status | None:
-        """What to do this time; called after `initialise`."""
+        """Decide what to do this time; called after `initialise`."""
         return None
 
     def update(self) -> Status:
         return self.decorated.status
 
     def due_in(self) -> float | None:
-        """Seconds until the child can begin anew, none where nothing was given; None if it runs."""
+        """Return the seconds until the child can begin anew; 0 without a pause; None if it runs."""
         return None if self.decorated.status is Status.RUNNING else self.left()
 
     def tick(self) -> Iterator[Behaviour]:
@@ -110,7 +110,7 @@ class Deadline(Gate):
         raise ValueError(f"not done within {self._seconds:g} s{told}")
 
     def due_in(self) -> float | None:
-        """Seconds until the deadline."""
+        """Return the seconds until the deadline."""
         return None if self._expired else self.left()
 
 
@@ -212,7 +212,7 @@ class Repeat(Gate):
         return self.count() if status is self._again else status
 
     def count(self) -> Status:
-        """Note that a round is done, and what that means."""
+        """Count a round that is done, and return the status that follows."""
         self._done += 1
         self.feedback_message = f"{self._done}{self._of} done"
         if self._done == self._limit:

@@ -1,6 +1,6 @@
 """Leaves that do something small and need no ROS: wait, check, set variables, write to the log.
 
-What a function given to them raises as a ValueError fails the leaf, with its text.
+A ValueError of a function that is given to them fails the leaf, with its text.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ from collections.abc import Callable
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Leaf, Limited
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.traffic.backend import LEVELS
 from bt_actions.utilities.units import parse_duration
 
@@ -35,7 +36,7 @@ class Wait(Leaf):
 class WaitUntil(Limited):
     """Succeeds as soon as a condition holds; fails after `timeout` seconds where one is given.
 
-    What cannot be computed yet (a variable without a value) does not hold yet.
+    A condition that cannot be computed yet (a variable without a value) does not hold yet.
     """
 
     def __init__(self, name: str, condition: Callable[[], bool], timeout: float | None) -> None:

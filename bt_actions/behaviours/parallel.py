@@ -13,7 +13,7 @@ from py_trees.composites import Parallel as PyTreesParallel
 class Parallel(PyTreesParallel):
     """Succeeds when enough children have; fails as soon as that cannot happen any more.
 
-    What is still running then is stopped. py_trees' own Parallel fails with the first child that
+    Children that still run are stopped then. py_trees' own Parallel fails with the first child that
     does, whatever the policy, and starts finished children again unless told otherwise.
 
     Args:

@@ -1,4 +1,4 @@
-"""What a leaf makes of a result: whether it is as expected, and what of it is saved. No ROS.
+"""How a leaf reads a result: whether it is as expected, and what of it is saved. No ROS.
 
 A result is what an action or a service gave, or a message of a topic. Conditions and places are
 functions of it; as text, ``$x`` in them is a variable, and ``result`` what the server gave.
@@ -14,7 +14,8 @@ from typing import Any
 from py_trees.blackboard import Blackboard, KeyMetaData
 
 from bt_actions.behaviours.variables import key, read
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
 

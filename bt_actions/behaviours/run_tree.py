@@ -1,6 +1,6 @@
 """The leaf that has a tree run by a server of trees, on this machine or another one. No ROS here.
 
-What a goal goes through is ActionBehaviour's. Here stand only what is sent and how a result of
+The life of a goal is ActionBehaviour's. Here stand only what is sent and how a result of
 RunTree is read; the server's half is bt_actions/serving/.
 """
 
@@ -13,7 +13,7 @@ from typing import Any
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.variables import Var, resolve
-from bt_actions.expressions.expression import ExpressionError
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.goals.policy import Outcome, Timeouts
 from bt_actions.messages.conversion import to_plain
 from bt_actions.messages.interfaces import RUN_TREE
@@ -66,15 +66,15 @@ class RunTree(ActionBehaviour):
         super().__init__(name, RUN_TREE, server, goal, timeout=timeout, **kwargs)
 
     def names(self, result: Any) -> Mapping[str, object]:
-        """The result, and the outputs of the tree."""
+        """Return the result, and the outputs of the tree."""
         return roots_of(result)
 
     def settles(self, result: Any) -> bool:
-        """Whether the server accounts for every goal of the run."""
+        """Return whether the server accounts for every goal of the run."""
         return result is not None and bool(result.settled)
 
     def explain(self, outcome: Outcome, result: Any) -> str:
-        """The run's chain of failures; or where the reason of a rejection is told."""
+        """Return the run's chain of failures; or where the reason of a rejection is told."""
         if outcome is Outcome.REJECTED:
             return "its log, and its topic ~/rejections, say why"
         return "; ".join(result.error_msg.splitlines()) if result is not None else ""
@@ -86,7 +86,7 @@ class RunTree(ActionBehaviour):
 
 
 def roots_of(result: Any) -> dict[str, object]:
-    """What expressions over a result may name. Raises ValueError for outputs that are none."""
+    """Return what expressions may name of a result; raises ExpressionError for wrong outputs."""
     try:
         outputs = json.loads(getattr(result, "outputs", "") or "{}")
     except (ValueError, RecursionError) as error:
@@ -97,7 +97,7 @@ def roots_of(result: Any) -> dict[str, object]:
 
 
 def inputs_text(values: object) -> str:
-    """Inputs as RunTree has them. Raises ValueError for what cannot be sent, and says where."""
+    """Write inputs as RunTree has them. Raises ValueError for one that cannot be sent."""
     if not isinstance(values, Mapping):
         raise ValueError(f"inputs are a mapping of names to values, not {values!r:.40}")
     plain = to_plain(values)

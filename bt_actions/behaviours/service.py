@@ -9,7 +9,7 @@ from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Connected, Limited
 from bt_actions.behaviours.topics import LOOKS
-from bt_actions.expressions.expression import ExpressionError
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.goals.policy import Retry
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
@@ -112,7 +112,7 @@ class CallService(Connected[Service], Limited):
         self._drop()
 
     def due_in(self) -> float | None:
-        """Seconds until the next deadline, try or look."""
+        """Return the seconds until the next deadline, try or look."""
         return self.left() if self._pausing or self._call is not None else LOOKS
 
     def _drop(self) -> None:
@@ -122,7 +122,7 @@ class CallService(Connected[Service], Limited):
         self._call = None
 
     def _again(self) -> bool:
-        """Whether what has failed is tried again; the pause before that begins."""
+        """Return whether what has failed is tried again; the pause before that begins."""
         self._tries += 1
         if self._tries >= self.retry.attempts:
             return False

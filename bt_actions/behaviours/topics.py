@@ -10,7 +10,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Connected, Limited, Stopwatch
-from bt_actions.expressions.expression import ExpressionError
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend, Publisher, Subscription
@@ -23,7 +23,7 @@ KEPT = 100
 
 
 class TopicValue(Connected[Subscription]):
-    """A topic whose latest message a tree reads as a variable. It is in no tree itself."""
+    """A topic whose latest message a tree reads as a variable. The value itself is in no tree."""
 
     def __init__(
         self, name: str, message_type: type | str, topic: str, qos: str, max_age: float | None
@@ -51,7 +51,7 @@ class TopicValue(Connected[Subscription]):
         return backend.subscription(interface(message_type, "msg"), topic, qos, take)
 
     def read(self) -> object:
-        """The latest message. Raises ExpressionError when there is none, or it is too old."""
+        """Return the latest message. Raises ExpressionError where it is missing or too old."""
         if self._backend is None:
             raise ExpressionError(f"nothing has come on {self._given[1]} yet (${self.name})")
         topic = self._own.name
@@ -67,7 +67,7 @@ class TopicValue(Connected[Subscription]):
         return message
 
     def first_may_come(self) -> float:
-        """Seconds for which the first message may be on its way; 0 afterwards."""
+        """Return the seconds for which the first message may be on its way; 0 afterwards."""
         return 0.0 if self._own is None or self._newest else float(self._own.may_come())
 
 
@@ -183,7 +183,7 @@ class Publish(Connected[Publisher], Limited):
     """
 
     warning = ""
-    """What a SUCCESS does not say: that nobody listened."""
+    """The words beside a SUCCESS where nobody listened."""
 
     def __init__(
         self,
@@ -225,5 +225,5 @@ class Publish(Connected[Publisher], Limited):
         return Status.SUCCESS
 
     def due_in(self) -> float | None:
-        """Seconds until it looks again for who listens."""
+        """Return the seconds until it looks again for listeners."""
         return LOOKS

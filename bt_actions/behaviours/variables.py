@@ -77,7 +77,7 @@ def resolve(data: Any, value_of: Callable[[Var], Any] = Var.read) -> Any:
 
 
 def reads_variables(data: Any) -> bool:
-    """Whether `resolve` would read anything."""
+    """Return whether `resolve` would read anything."""
     found: list[Var] = []
     resolve(data, found.append)
     return bool(found)

@@ -14,7 +14,8 @@ from bt_actions.document.findings import (
     Severity,
     Span,
 )
-from bt_actions.document.findings.rules import RULES, Rule
+from bt_actions.document.findings.rule import Rule
+from bt_actions.document.findings.rules import RULES
 from bt_actions.document.load import (
     Tree,
     check_file,

@@ -31,18 +31,6 @@ if TYPE_CHECKING:
     from bt_actions.document.building.context import Scope
     from bt_actions.document.language.classes import Python
 
-__all__ = [
-    "Tree",
-    "check_file",
-    "check_source",
-    "given_inputs",
-    "load_tree",
-    "open_tree",
-    "tree_inputs",
-    "tree_name",
-    "tree_outputs",
-]
-
 PathLike = str | os.PathLike[str]
 P = ParamSpec("P")
 T = TypeVar("T")

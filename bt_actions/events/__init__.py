@@ -1,4 +1,4 @@
-"""What happens in a run, as one stream that feeds terminal, log, recorder and page. Values only."""
+"""The events of a run, one stream that feeds terminal, log, recorder and page. Values only."""
 
 from __future__ import annotations
 

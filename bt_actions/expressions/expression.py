@@ -2,7 +2,7 @@
 
 No ROS here. Evaluating calls nothing but what `functions.py` lists, reads no name that begins with
 an underscore, makes no large number and no large text, and raises nothing but
-`ExpressionError`. What stands in a text is parsed in `form.py`.
+`ExpressionError`. `form.py` parses the text.
 """
 
 from __future__ import annotations
@@ -16,8 +16,6 @@ from bt_actions.expressions.form import Failed, Form
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.expressions.values import reason, show
 
-__all__ = ["MAX_LENGTH", "Expression", "ExpressionError"]
-
 MAX_LENGTH = 2000
 """Characters in one expression."""
 _NAME = re.compile(r"\$([A-Za-z]\w*)", re.ASCII)
@@ -27,10 +25,10 @@ _form = lru_cache(maxsize=1024)(Form)
 class Expression:
     """An expression that was read and found well-formed.
 
-    `roots` are the bare names it may use (`result`, `feedback`, `message`, `item`). `names` are
-    the variables it reads, without the dollar sign, `variables` the same in reading order;
-    `constants` the constants of messages; `tree` is its syntax tree, for type-checkers. Expressions
-    that differ by the names of their variables alone have one `form`, which is parsed once.
+    `roots` are the bare names it may use (`result`, `feedback`, `message`, `item`). `variables` are
+    the variables it reads, without the dollar sign, in reading order; `tree` is its syntax tree,
+    for type-checkers. Expressions that differ by the names of their variables alone have one
+    `form`, which is parsed once.
     """
 
     __slots__ = ("form", "text", "variables")
@@ -42,8 +40,11 @@ class Expression:
         roots: Iterable[str] = frozenset({"result"}),
         constants: Callable[[str], object] | None = None,
     ) -> None:
-        """`constants` gives the value of ``MoveRobot.Result.STATUS_FAULT``, or raises ValueError;
-        it is asked when the expression is evaluated."""
+        """Read `text`; raises ExpressionError.
+
+        `constants` returns the value of ``MoveRobot.Result.STATUS_FAULT``, or raises ValueError,
+        when the expression is evaluated.
+        """
         self.text = text
         if len(text) > MAX_LENGTH:
             raise ExpressionError(f"longer than {MAX_LENGTH} characters", 0, len(text))
@@ -72,14 +73,6 @@ class Expression:
         return self.form.roots
 
     @property
-    def constants(self) -> list[str]:
-        return self.form.constants
-
-    @property
-    def names(self) -> frozenset[str]:
-        return frozenset(self.variables)
-
-    @property
     def asked(self) -> frozenset[str]:
         """The variables that `known` asks for: this expression is right where they lack a value."""
         asked = self.form.asked
@@ -95,7 +88,7 @@ class Expression:
         return tuple(zip(self.variables, spans, strict=True))
 
     def evaluate(self, roots: Mapping[str, object], variable: Callable[[str], object]) -> object:
-        """The value; `variable` looks a name up and raises KeyError for one that has none."""
+        """Return the value; `variable` returns a variable's, or raises KeyError."""
         try:
             return self.form.evaluate(roots, variable, self.variables)
         except ExpressionError:
@@ -111,7 +104,7 @@ class Expression:
             raise ExpressionError(f"cannot be computed: {why}", 0, len(self.text)) from error
 
     def holds(self, roots: Mapping[str, object], variable: Callable[[str], object]) -> bool:
-        """The value of a condition, which must be true or false."""
+        """Return the value of a condition, which must be true or false."""
         value = self.evaluate(roots, variable)
         if not isinstance(value, bool):
             raise ExpressionError(
@@ -120,27 +113,27 @@ class Expression:
         return value
 
     def span(self, node: ast.expr) -> tuple[int, int]:
-        """The columns of a node of `tree` in `text`."""
+        """Return the columns of a node of `tree` in `text`."""
         start, end = self.form.span(node)
         if self.form.text == self.text:
             return start, end
         return self._column(start), self._column(end - 1) + 1
 
     def _column(self, at: int) -> int:
-        """The column in `text` of one in the text of its form, where every name is `v`."""
+        """Return the column in `text` of one in the text of its form, where every name is `v`."""
         starts = [self.form.span(node)[0] for node in self.form.variables.values()]
         return at + sum(
             len(name) - 1 for name, start in zip(self.variables, starts, strict=True) if start < at
         )
 
     def reads_field_of(self, name: str) -> bool:
-        """Whether it reads a field of a variable, as it does of a message."""
+        """Return whether it reads a field of a variable, as it does of a message."""
         return any(
             isinstance(node, ast.Attribute) and self.variable_of(node.value) == name
             for node in ast.walk(self.tree)
         )
 
     def variable_of(self, node: ast.AST) -> str | None:
-        """The variable a node of `tree` reads, or None."""
+        """Return the variable a node of `tree` reads, or None."""
         at = self.form.number_of(node)
         return None if at is None else self.variables[at]

@@ -25,8 +25,6 @@ from bt_actions.expressions.values import (
 )
 from bt_actions.utilities.plain_data import plain
 
-__all__ = ["Failed", "Form"]
-
 _MAX_DEPTH = 60
 _INFINITE = float("inf")
 _CONSTANTS = {"true": True, "false": False, "True": True, "False": False}
@@ -43,9 +41,9 @@ _INTERFACE = re.compile(r"[a-z]\w*(?:/(?:msg|srv|action))?/(?P<constant>[A-Z]\w*
 _PERCENT = re.compile(
     r"(?<![\w.$])(\d+(?:\.\d+)?) *(?:%|percent\b)(?= *(?:$|[)\],<>=!]|and\b|or\b))"
 )
-"""What is not the remainder of a division."""
+"""A percent sign that is not the remainder of a division."""
 _COMPARED = re.compile(r"(?:[=!]=|[\[,]) *\Z")
-"""What stands before a word that may be meant as a text."""
+"""The place before a word that may be meant as a text."""
 Variable = Callable[[str], object]
 _Roots = Mapping[str, object]
 _Names = tuple[str, ...]
@@ -74,21 +72,18 @@ class Form:
         self.evaluate = self._compile(self.tree, 0)
 
     def span(self, node: ast.expr) -> tuple[int, int]:
-        """The columns of a node of `tree` in `text`."""
-        origin = self._source.origin
-        end = len(origin) - 1
-        start = origin[min(node.col_offset, end)]
-        last = origin[min(max((node.end_col_offset or 1) - 1, 0), end)]
-        return start, max(last + 1, start + 1)
+        """Return the columns of a node of `tree` in `text`."""
+        origin, end = self._source.origin, node.end_col_offset or 1
+        return origin[node.col_offset], origin[end - 1] + 1
 
     def number_of(self, node: ast.AST) -> int | None:
-        """Which variable in reading order a node of `tree` reads, or None."""
+        """Return the number, in reading order, of the variable that `node` reads, or None."""
         if isinstance(node, ast.Name) and node.col_offset in self._source.variables:
             return [*self.variables].index(node.col_offset)
         return None
 
     def constant_of(self, node: ast.AST) -> str | None:
-        """The dotted name of the constant that a node of `tree` stands for, or None."""
+        """Return the dotted name of the constant that a node of `tree` stands for, or None."""
         names: list[str] = []
         inner = node
         while isinstance(inner, ast.Attribute):
@@ -101,37 +96,25 @@ class Form:
         return ".".join([inner.id, *reversed(names)])
 
     def constant(self, name: str) -> object:
-        """The value of a constant by its dotted name. Raises ValueError."""
+        """Return the value of a constant by its dotted name. Raises ValueError."""
         assert self._constants is not None
         return self._constants(name)
 
     def _parse(self) -> ast.expr:
         source = self._source
-        stripped = source.text.lstrip()
-        offset = len(source.text) - len(stripped)
         try:
-            tree = ast.parse(stripped.rstrip(), mode="eval").body
+            tree = ast.parse(source.text.rstrip(), mode="eval").body
         except SyntaxError as error:
             if foreign := foreign_in(self.text):
                 raise foreign from None
             if percent := _PERCENT.search(self.text):
                 said = f"{percent[0]!r}: write {float(percent[1]) / 100:g}"
                 raise ExpressionError(said, *percent.span()) from None
-            column = source.origin[
-                min(
-                    offset + ((error.offset or 0) - 1 if error.offset else len(source.text)),
-                    len(source.origin) - 1,
-                )
-            ]
+            at = error.offset - 1 if error.offset else len(source.text)
+            column = source.origin[min(at, len(source.text))]
             raise ExpressionError(_syntax(self.text, column, error), column) from None
         except (RecursionError, MemoryError, ValueError):
             raise ExpressionError("nested too deep", 0, len(self.text)) from None
-        if offset:
-            for node in ast.walk(tree):
-                if hasattr(node, "col_offset"):
-                    node.col_offset += offset
-                if getattr(node, "end_col_offset", None) is not None:
-                    node.end_col_offset += offset  # type: ignore[attr-defined]
         for node in ast.walk(tree) if "._" in source.text else ():
             if isinstance(node, ast.Attribute):  # as it was written: `translate` may change it
                 end = self.span(node)[1]
@@ -210,7 +193,7 @@ class Form:
             raise self._refusal(node, f"{name}() takes {takes}, not {len(args)}")
 
     def _compile_known(self, node: ast.expr, part: Callable[[ast.expr], _Closure]) -> _Closure:
-        """A closure that tells whether a part has a value, and never fails."""
+        """Return a closure that tells whether a part has a value, and never fails."""
         if not isinstance(node, (ast.Name, ast.Attribute, ast.Subscript)):
             raise self._refusal(node, "known() asks for one value: known($name), known($a.b.0)")
         before = len(self.variables)
@@ -227,7 +210,7 @@ class Form:
         return known
 
     def _meant(self, function: ast.expr, args: list[ast.expr]) -> str | None:
-        """What to write for a function or a method of another language."""
+        """Return what to write for a function or a method of another language."""
         given = [self.text[slice(*self.span(arg))] for arg in args]
         match function:
             case ast.Name(id=name):
@@ -273,7 +256,7 @@ class Form:
         return compare
 
     def _guard(self, node: ast.expr, function: Callable[..., object], *parts: _Closure) -> _Closure:
-        """A closure that applies `function` and puts the place of `node` on what it raises."""
+        """Return a closure that applies `function`, and puts the place of `node` on its error."""
 
         def apply(roots: _Roots, variable: Variable, names: _Names) -> object:
             values = [part(roots, variable, names) for part in parts]

@@ -12,17 +12,15 @@ from collections.abc import Callable, Sized
 from types import MappingProxyType
 from typing import Any
 
-from bt_actions.expressions.values import number, show
+from bt_actions.expressions.values import LENGTHS, number, show
 from bt_actions.utilities.plain_data import of_float32, plain, scalar, shortest
-
-__all__ = ["ARGUMENTS", "FUNCTIONS", "KNOWN", "instead_of", "listed"]
 
 KNOWN = "known"
 """The function that asks for a value and does not read it: `form.py` has its code."""
 _DIGITS = 15
 """Of a fraction, which a float64 can tell apart."""
 _CALLED = {
-    "len": "length size count",
+    "len": " ".join(LENGTHS),
     "str": "string tostring to_string text",
     "int": "integer toint to_int trunc truncate",
     "float": "double real tofloat to_float",
@@ -30,7 +28,7 @@ _CALLED = {
     KNOWN: "exists exist defined isset is_set has is_known",
 }
 _FOREIGN = {word: name for name, words in _CALLED.items() for word in words.split()}
-"""What other languages call our functions."""
+"""Our functions by the names of other languages."""
 _JOINS = {"append": "[{}]", "push": "[{}]", "push_back": "[{}]", "extend": "{}", "concat": "{}"}
 """How other languages join lists, and what stands here behind a plus sign."""
 _WHOLE = re.compile(r"\s*[-+]?[0-9]{1,100}\s*", re.ASCII)
@@ -134,13 +132,13 @@ ARGUMENTS = MappingProxyType(
 
 
 def listed() -> str:
-    """The names of all functions, as a sentence lists them."""
+    """Return the names of all functions, as a sentence lists them."""
     *most, last = ARGUMENTS
     return f"{', '.join(most)} and {last}"
 
 
 def instead_of(name: str, owner: str | None, arguments: list[str]) -> str | None:
-    """What to write for a call of another language: ``length($x)``, ``$x.append(1)``.
+    """Return what to write for a call of another language: ``length($x)``, ``$x.append(1)``.
 
     `owner` is what stands before the dot of a method. None where nothing is known.
     """

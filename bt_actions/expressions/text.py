@@ -11,9 +11,6 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-_SIMPLE = re.compile(r"(?:[A-Za-z0-9_ .,+\-*/%<>=()\[\]]|\$(?=[A-Za-z]))*")
-"""Texts of which each character keeps its place: nearly all."""
-_INDEX = re.compile(r"[A-Za-z_)\]]\w*\.[0-9]")
 _RUN_ON = re.compile(
     r"""'[^']*'|"[^"]*"|(?<![\w.$])(?:0[xX][0-9a-fA-F]+?|[\d.][\d._]*(?:[eE][+-]?\d+)?[jJ]?)"""
     r"(and|else|for|if|in|is|not|or)\b"
@@ -23,7 +20,7 @@ _FIELD = re.compile(rf"""'[^']*'|"[^"]*"|\.({"|".join(keyword.kwlist)})\b""")
 _FOREIGN = re.compile(
     r"""'[^']*'|"[^"]*"|(?P<equal>[!=]==)|(?<![\w.$])(?P<word>(?!and|or|not)(?i:and|or|not))\b"""
 )
-"""What other languages write, and Python cannot read."""
+"""Operators of other languages, which Python cannot read."""
 _NEGATED = re.compile(r"!\s*(\$?[\w.$\[\]]+)")
 _BAD_WORDS = {
     # of other languages, and of chats and word processors
@@ -49,6 +46,14 @@ _BAD_WORDS = {
     "¬": "write 'not'",
     "…": "write out what it stands for",
 }
+_BREAK = re.compile(r"[\\\n\r]")
+_PIECE = re.compile(
+    r"""(?P<text>'[^'\\\n\r]*'|"[^"\\\n\r]*")|(?P<space>[\n\r\t])|(?P<variable>\$(?=[A-Za-z]))"""
+    r"""|(?P<number>(?:(?<![\w.])\d|(?<![\w.)\]])\.\d)[\w.]*)|(?<=[\w)\]])\.(?P<index>\d+)"""
+    rf"""|(?P<wrong>['"$]|!(?!=)|{"|".join(map(re.escape, _BAD_WORDS))}|[^\x00-\x7F])""",
+    re.ASCII,
+)
+"""Pieces that Python reads otherwise, or not at all, and numbers, whose dots are no indices."""
 
 
 class ExpressionError(ValueError):
@@ -73,63 +78,48 @@ class Source(NamedTuple):
 
 
 def translate(text: str) -> Source:
-    """`$name` becomes `_name`, and the `.0` of `$name.0` becomes `[0]`, keeping the places.
+    """Make `$name` `_name`, and the `.0` of `$name.0` `[0]`, keeping the places.
 
-    So does a field that is a word of Python's: its first letter becomes `_`.
+    The first letter of a field that is a word of Python's becomes `_`.
     """
     for match in _RUN_ON.finditer(text):
         if match[1]:
             raise ExpressionError(f"a space is missing before {match[1]!r}", *match.span(1))
     if "." in text:
         text = _FIELD.sub(lambda found: f"._{found[1][1:]}" if found[1] else found[0], text)
-    if _SIMPLE.fullmatch(text) and "<>" not in text and not _INDEX.search(text):
-        variables_at = [at for at, char in enumerate(text) if char == "$"] if "$" in text else []
-        return Source(text.replace("$", "_"), range(len(text) + 1), frozenset(variables_at))
     out: list[str] = []
     origin: list[int] = []
     variables: set[int] = set()
-
-    def put(piece: str, at: int) -> None:
-        for char in piece:
-            out.append(char)
-            origin.append(at)
-
-    index, size = 0, len(text)
-    while index < size:
-        char = text[index]
-        if char in "'\"":
-            end = _end_of_string(text, index)
-            for at in range(index, end):
-                put(_ascii(text[at]), at)
-            index = end
-        elif char == "$":
-            if not (text[index + 1 : index + 2].isalpha() and text[index + 1].isascii()):
-                raise ExpressionError("a dollar sign begins a name: write $name", index)
-            variables.add(len(out))
-            put("_", index)
-            index += 1
-        elif char == "." and text[index + 1 : index + 2].isdigit() and _follows_value(text, index):
-            end = index + 1
-            while end < size and text[end].isdigit():
-                end += 1
-            put("[", index)
-            for at in range(index + 1, end):
-                put(text[at], at)
-            put("]", end - 1)
-            index = end
-        elif char in "\n\r\t":
-            put(" ", index)
-            index += 1
-        else:
-            _refuse_foreign(text, index)
-            put(char, index)
-            index += 1
-    origin.append(size)
+    done = len(text) - len(text.lstrip())  # Python would take spaces before it for a block
+    for piece in _PIECE.finditer(text, done):
+        start, end = piece.span()
+        out.append(text[done:start])
+        origin.extend(range(done, start))
+        done = end
+        made, places = piece[0], [*range(start, end)]
+        match piece.lastgroup:
+            case "text" if not made.isascii():  # Python counts columns in UTF-8 bytes
+                escaped = [each if each.isascii() else f"\\U{ord(each):08x}" for each in made]
+                made = "".join(escaped)
+                places = [at for at, each in zip(places, escaped, strict=True) for _ in each]
+            case "variable":
+                variables.add(len(origin))
+                made = "_"
+            case "index":
+                made, places = f"[{piece['index']}]", [*places, end - 1]
+            case "space":
+                made = " "
+            case "wrong":
+                raise _refusal(text, *piece.span())
+        out.append(made)
+        origin.extend(places)
+    out.append(text[done:])
+    origin.extend(range(done, len(text) + 1))
     return Source("".join(out), origin, frozenset(variables))
 
 
 def foreign_in(text: str) -> ExpressionError | None:
-    """What is wrong with a text that holds a word of another language outside of its quotes."""
+    """Return the error for a word of another language, outside of quotes; or None."""
     for found in _FOREIGN.finditer(text):
         if found["equal"]:
             return ExpressionError(f"{found[0]!r}: write '{found[0][:2]}'", *found.span())
@@ -138,45 +128,18 @@ def foreign_in(text: str) -> ExpressionError | None:
     return None
 
 
-def _end_of_string(text: str, start: int) -> int:
-    index = start + 1
-    while index < len(text) and text[index] != text[start]:
-        if text[index] in "\\\n\r":
-            raise ExpressionError("a text here holds no backslash and no line break", index)
-        index += 1
-    if index == len(text):
-        raise ExpressionError("this text has no closing quote", start, len(text))
-    return index + 1
-
-
-def _ascii(char: str) -> str:
-    """Python counts columns in UTF-8 bytes: inside a text, escape what is more than one byte."""
-    return char if char.isascii() else f"\\U{ord(char):08x}"
-
-
-def _follows_value(text: str, index: int) -> bool:
-    """Whether the dot at `index` stands behind a name or an index, not inside a number."""
-    start = index
-    while start > 0 and (text[start - 1].isalnum() or text[start - 1] == "_"):
-        start -= 1
-    word = text[start:index]
-    if not word:
-        return index > 0 and text[index - 1] in ")]"
-    if not word[0].isdigit():
-        return True
-    return start > 0 and text[start - 1] == "." and _follows_value(text, start - 1)
-
-
-def _refuse_foreign(text: str, index: int) -> None:
-    char = text[index]
-    if char == "!" and text[index + 1 : index + 2] == "=":
-        return
-    if char == "!":
-        negated = _NEGATED.match(text, index)
-        wanted = f"not {negated[1]}" if negated else "not"
-        raise ExpressionError(f"'!': write '{wanted}'", index)
-    for word in (text[index : index + 2], char):
-        if word in _BAD_WORDS:
-            raise ExpressionError(f"{word!r}: {_BAD_WORDS[word]}", index, index + len(word))
-    if not char.isascii():
-        raise ExpressionError(f"{char!r} has no place in an expression", index)
+def _refusal(text: str, start: int, end: int) -> ExpressionError:
+    wrong = text[start:end]
+    if wrong in _BAD_WORDS:
+        return ExpressionError(f"{wrong!r}: {_BAD_WORDS[wrong]}", start, end)
+    if wrong in "'\"":
+        if found := _BREAK.search(text, start):
+            what = "a text here holds no backslash and no line break"
+            return ExpressionError(what, found.start())
+        return ExpressionError("this text has no closing quote", start, len(text))
+    if wrong == "$":
+        return ExpressionError("a dollar sign begins a name: write $name", start)
+    if wrong == "!":
+        negated = _NEGATED.match(text, start)
+        return ExpressionError(f"'!': write '{f'not {negated[1]}' if negated else 'not'}'", start)
+    return ExpressionError(f"{wrong!r} has no place in an expression", start)

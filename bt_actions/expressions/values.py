@@ -1,4 +1,4 @@
-"""What the parts of an expression do with values: fields, items, numbers, comparisons.
+"""The work of an expression's parts on values: fields, items, numbers, comparisons.
 
 No ROS here: a message is recognised by what it can do. A function here raises `ValueError` with
 a readable text, or whatever the value itself raises; `expression.py` turns both into its error
@@ -22,8 +22,8 @@ MAX_BITS = 256
 MAX_ITEMS = 10_000
 MAX_JOINED = 100_000
 """Items in a list that is joined of others."""
-LENGTHS = frozenset({"length", "size", "count"})
-"""What other languages call `len`."""
+LENGTHS = ("length", "size", "count")
+"""Names of `len` in other languages."""
 
 
 def number(value: object) -> int | float:
@@ -34,7 +34,7 @@ def number(value: object) -> int | float:
 
 
 def add(left: object, right: object) -> object:
-    """The sum of two numbers, two texts as one, or the items of two lists in a new one."""
+    """Return the sum of two numbers, two texts as one, or the items of two lists in a new one."""
     left, right = _items(left), _items(right)
     if isinstance(left, str) and isinstance(right, str):
         return left + right
@@ -53,7 +53,7 @@ def add(left: object, right: object) -> object:
 
 
 def _items(value: object) -> object:
-    """A list, whatever holds it, as one of Python's; any other value as it is."""
+    """Return a list of any kind as one of Python's; any other value as it is."""
     if hasattr(value, "__len__") and len(value) > MAX_JOINED and not isinstance(value, str):
         raise ValueError(f"a list of more than {MAX_JOINED:,} items cannot be joined")
     value = plain(value)
@@ -85,7 +85,7 @@ def truth(value: object) -> bool:
 
 
 def field(value: object, name: str) -> object:
-    """A field of a message, a key of a mapping, a public attribute of a plain value object."""
+    """Return a field of a message, a key of a mapping, or a public attribute of a plain value."""
     if isinstance(value, Mapping):
         if name in value:
             return scalar(value[name])
@@ -132,7 +132,7 @@ def item(value: object, index: object) -> object:
 
 
 def cut(value: object, start: object, end: object) -> object:
-    """The items of a list, or the characters of a text, from `start` to before `end`; None: all."""
+    """Return the items of a list, or characters of a text, from `start` to before `end`."""
     value = scalar(value)
     if isinstance(value, Mapping) or not hasattr(value, "__getitem__"):
         raise ValueError(f"{show(value)} has no items")
@@ -202,7 +202,7 @@ def show(value: object) -> str:
 
 
 def reason(error: Exception, text: str) -> str:
-    """Why `text`, a part of an expression, has no value."""
+    """Return why `text`, a part of an expression, has no value."""
     if isinstance(error, ZeroDivisionError):
         return f"{text} divides by zero"
     if isinstance(error, OverflowError):

@@ -1,6 +1,6 @@
-"""What the server of one goal was asked, how often, and what it said: two small machines.
+"""The questions to the server of one goal, and its answers: two small machines.
 
-They count and remember. What is asked, and what follows from an answer, is decided in the steps
+The machines count and remember. The steps decide what to ask, and what follows from an answer
 (goals/steps). Seconds are those of the steady clock.
 """
 
@@ -42,7 +42,7 @@ class Asking:
     """Requests since anything was heard of the goal."""
     asked_at: float | None = None
     answer: int | None = None
-    """What was answered, a code of action_msgs/srv/CancelGoal."""
+    """The last answer, a code of action_msgs/srv/CancelGoal."""
     denied_since: float = math.inf
     """Every answer since then was: unknown goal."""
     in_vain: bool = False
@@ -69,7 +69,7 @@ class Asking:
         self._denied_at, self.denied_since = now, min(now, self.denied_since)
 
     def denied_lately(self, now: float) -> bool:
-        """Whether the last answer was a denial, and is not old."""
+        """Return whether the last answer was a denial, and is not old."""
         return self.denied_since < math.inf and now - self._denied_at <= 2 * ASK_AGAIN
 
     def left_to_deny(self, now: float) -> float:
@@ -77,7 +77,7 @@ class Asking:
         return min(now, self.denied_since) + DENIED_FOR_GOOD - now
 
     def begin_anew(self, now: float) -> None:
-        """Whoever had it is to be asked again; of what was said, a late denial still counts."""
+        """Ask whoever has the goal again; of all answers, only a late denial still counts."""
         if not self.denied_lately(now):
             self.denied_since = math.inf
         self.unheard, self.answer = 0, None

@@ -58,7 +58,7 @@ class Attempts:
     """The tries of one visit to a leaf."""
 
     def __init__(self, retry: Retry, when: Callable[[Any], bool] | None) -> None:
-        """`when` is `retry.when` made callable; if it raises, that counts as no."""
+        """Begin a visit; `when` is `retry.when` made callable, and means no where it raises."""
         self.retry = retry
         self.history: list[AttemptRecord] = []
         self._when = when
@@ -93,7 +93,7 @@ class Attempts:
         return max(0.0, resume_at - now.ros)
 
     def _why_not(self, record: AttemptRecord) -> str | None:
-        """Why it is not tried again: "" where that goes without saying; None where it is."""
+        """Return why there is no other attempt: "" where that is plain; None where there is one."""
         if record.outcome not in self.retry.outcomes:
             known = record.outcome in RETRYABLE
             return f"{record.outcome} is not among the outcomes of retry" if known else ""

@@ -28,7 +28,7 @@ class Deadlines:
             self._due[event] = now + seconds
 
     def __contains__(self, event: Event) -> bool:
-        """Whether this one is set."""
+        """Return whether this deadline is set."""
         return event in self._due
 
     def disarm(self, *events: Event) -> None:
@@ -48,7 +48,7 @@ class Deadlines:
         return [(max(left, suspended), event) for left, event in waits]
 
     def take_passed(self, event: Event, now: Now) -> bool:
-        """Whether this one is still set and has passed; it is forgotten then."""
+        """Return whether this deadline has passed; it is forgotten then."""
         if event not in self._due or now.steady < self._not_before or self._left(event, now) > 0.0:
             return False
         del self._due[event]
@@ -64,7 +64,7 @@ class Deadlines:
         self._not_before = now.steady + seconds
 
     def follow(self, now: Now) -> None:
-        """It is so late; where the ROS clock has jumped back, deadlines on it jump with it."""
+        """Take the moment; where the ROS clock has jumped back, deadlines on it jump with it."""
         back = self.now.ros - now.ros
         if back > 0.0:
             for event in ON_ROS_CLOCK & self._due.keys():

@@ -1,6 +1,6 @@
-"""What is known of one goal, and what a step of the table is, which changes it.
+"""The facts of one goal, and the steps of the table, which change them.
 
-Whoever has a goal reads these facts. Its steps (goals/steps) write them, by the tools below, which
+Everybody may read the facts. Its steps (goals/steps) write them, by the tools below, which
 are said once where several steps do the same; `Goal.on` writes the state that a step has led to.
 A caller may add to `reason`. A step sends nothing: what is to be done is left in `commands`.
 """
@@ -61,14 +61,14 @@ class Facts:
         self.state = self.last_live = State.QUEUED
         """Where it is, and where it was before it was LOST or DONE."""
         self.planned: Outcome | None = None
-        """What its outcome will be when it has ended, where it is not wanted any more."""
+        """The outcome when it has ended, of a goal that is not wanted any more."""
         self.outcome: Outcome | None = None
         self.reason = ""
         self.end = End.NEVER_STARTED
         self.result: Any = None
         self.feedback: Any = None
         self.claims_resources = True
-        """It has its resources, or a place in the queue for them."""
+        """Whether it has its resources, or a place in the queue for them."""
         self.asking = Asking()
         self.lost_result = LostResult()
         self.deadlines = Deadlines(now)
@@ -76,7 +76,7 @@ class Facts:
         self.commands: list[Command] = []
         """Of the step that is being made."""
         self.detail: Any = None
-        """What came with the event that it is made at."""
+        """The detail of the event that is being told."""
 
     @property
     def phase(self) -> State:
@@ -114,7 +114,7 @@ class Facts:
 
     @property
     def cancel_said(self) -> str:
-        """What its server has said of the request to cancel it, to follow a reason; or ""."""
+        """The server's answer to the request to cancel it, to follow a reason; or ""."""
         gone = self.state is State.LOST and self.end is not End.UNKNOWN  # else only its node is
         if gone or self.asking.asked_at is None or self.state is State.DONE:
             return ""
@@ -128,7 +128,7 @@ class Facts:
 
     @property
     def blamed(self) -> str:
-        """What to add to a reason that blames the goal: its fields, or ""."""
+        """The fields, to follow a reason that blames the goal; or ""."""
         fields = self.fields
         return f"; goal {fields}" if fields else ""
 
@@ -218,7 +218,7 @@ class Step:
 def leads_to(*to: State) -> Callable[[Does], Step]:
     """Make a function a step, which leads to one of these states or stays where it is.
 
-    What docs/goal.md says of it is the first line of the function's docstring.
+    docs/goal.md has the first line of the function's docstring.
     """
 
     def step(does: Does) -> Step:
@@ -230,4 +230,4 @@ def leads_to(*to: State) -> Callable[[Does], Step]:
 
 @leads_to()
 def drop(goal: Facts) -> None:
-    """Nothing: it came too late, or twice, to mean anything."""
+    """Drop it: it came too late, or twice, to mean anything."""

@@ -30,7 +30,7 @@ _made_by: tuple[int, bytes, itertools.count[int]] | None = None
 
 @dataclass(frozen=True, slots=True)
 class Author:
-    """Who chose a goal id."""
+    """The process that chose a goal id."""
 
     here: bool
     """On this machine, where its process can be looked for."""

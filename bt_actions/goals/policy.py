@@ -66,7 +66,7 @@ class End(StrEnum):
 
 
 class Busy(StrEnum):
-    """What to do when a resource that a goal needs is taken."""
+    """The ways to treat a goal whose resource is taken."""
 
     @classmethod
     def _missing_(cls, value: object) -> Busy:

@@ -1,4 +1,4 @@
-"""Who holds what, and who waits for it.
+"""The holders of resources, and the queue for them.
 
 A resource is a name ("/r1/move_robot", "base"). A holder asks for a set of names at once and gets
 all of them or none, so that two holders can never wait for each other. No ROS, no thread, no

@@ -50,7 +50,7 @@ class State(Enum):
 
 
 MAY_STILL_BE_ACCEPTED = frozenset({State.UNWANTED, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED})
-"""It was sent, is not wanted any more, and may still be accepted."""
+"""A goal that was sent, is not wanted any more, and may still be accepted."""
 ACCEPTED = frozenset({State.EXECUTING, State.REPLACED, State.CANCELING})
 _SHOWN = {
     State.REPLACED: "EXECUTING",
@@ -63,7 +63,7 @@ MAY_TURN_UP = MAY_STILL_BE_ACCEPTED | {State.SENDING, State.NOT_RECEIVED, State.
 
 
 class Command(Enum):
-    """What the caller must do next."""
+    """The next work of the caller."""
 
     __hash__ = object.__hash__  # Enum has one in Python, which is asked often
 
@@ -74,7 +74,7 @@ class Command(Enum):
 
 
 class Event(Enum):
-    """What can happen to a goal. The comment names the detail that comes with it."""
+    """The events of a goal. A comment names the detail that comes with one."""
 
     __hash__ = object.__hash__  # Enum has one in Python, which is asked often
 

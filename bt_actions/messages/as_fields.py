@@ -1,4 +1,4 @@
-"""What to write for a message that was given as a list of numbers, or as an angle:
+"""The fields to write for a message that was given as a list of numbers, or as an angle:
 ``{x: 1.0, y: 2.0, z: 0.0}``, ``{yaw: 90 deg}``."""
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ _ANGLES = "{roll: %s, pitch: %s, yaw: %s}"
 
 
 def as_fields(cls: type, value: object) -> str:
-    """The fields of a message, filled with the numbers of a list in their order; "" where they do
-    not fit it. What a variable gives stands as dots. An angle is the yaw of a quaternion."""
+    """Return a message's fields filled with a list's numbers, in order; "" where they do not fit.
+
+    Values of variables stand as dots. An angle is the yaw of a quaternion.
+    """
     is_rotation = interface_name(cls) == "geometry_msgs/msg/Quaternion"
     if is_rotation and isinstance(value, (str, int, float)):
         with contextlib.suppress(ValueError):
@@ -34,13 +36,13 @@ def as_fields(cls: type, value: object) -> str:
 
 
 def _in_degrees(angle: object, beyond: bool) -> str:
-    """An angle as people mean it who write one `beyond` a turn, without a unit."""
+    """Write an angle as it is meant by people who write one `beyond` a turn without a unit."""
     said = angle if isinstance(angle, str) else shorten(angle, 20)
     return f"{said} deg" if beyond and said[-1].isdigit() and said != "0" else said
 
 
 def _numbers_in(cls: type) -> int:
-    """How many numbers a message consists of; 0 where there is something else in it."""
+    """Count the numbers that a message consists of; 0 where other fields are in it."""
     counts = []
     for kind in describe(cls).values():
         if isinstance(kind, Message):

@@ -1,4 +1,4 @@
-"""What people write instead of a message's fields: times, durations, angles, constants by name.
+"""Short forms of a message's fields: times, durations, angles, constants by name.
 
 Each function leaves alone what it does not know, and raises ValueError with a readable text for
 what it knows and finds wrong.
@@ -23,7 +23,7 @@ ANGLES = ("roll", "pitch", "yaw")
 
 
 def time_of(value: object, now: Callable[[], int]) -> object:
-    """``now``, or seconds since the epoch, as the fields of a builtin_interfaces/Time."""
+    """Return ``now``, or seconds since the epoch, as the fields of a builtin_interfaces/Time."""
     if value == "now":
         nanoseconds = now()
         return {"sec": nanoseconds // _BILLION, "nanosec": nanoseconds % _BILLION}
@@ -33,7 +33,7 @@ def time_of(value: object, now: Callable[[], int]) -> object:
 
 
 def duration_of(value: object) -> object:
-    """``500 ms``, ``-1 s`` or seconds as the fields of a builtin_interfaces/Duration."""
+    """Return ``500 ms``, ``-1 s`` or seconds as a builtin_interfaces/Duration's fields."""
     return _seconds(parse_seconds(value) if isinstance(value, str) else value)
 
 
@@ -47,7 +47,7 @@ def _seconds(value: object) -> object:
 
 
 def quaternion_of(value: object, angle: Callable[[str, object], float]) -> object:
-    """``{yaw: 90 deg}`` (and roll, pitch: fixed axes x, y, z) as a unit quaternion's fields.
+    """Return ``{yaw: 90 deg}`` (and roll, pitch: fixed axes x, y, z) as a unit quaternion's fields.
 
     `angle` gives the radians of what is written for one of them.
     """
@@ -67,12 +67,12 @@ def quaternion_of(value: object, angle: Callable[[str, object], float]) -> objec
 
 
 def constant(text: str, owner: type | None) -> object:
-    """The constant a name stands for, seen from a field of `owner`; other texts are returned.
+    """Return the constant that a name stands for in a field of `owner`; other texts as they are.
 
     ``STATUS_MOVING`` is looked up in `owner`; ``MoveRobot.Feedback.STATUS_MOVING``,
     ``Feedback.STATUS_MOVING`` and ``sensor_msgs/msg/BatteryState.POWER_SUPPLY_STATUS_FULL`` in the
     class they name: beside `owner` unless a package is given, else in the one installed package
-    that has it. Raises UnknownInterface for what is no class, and ValueError for no constant of it.
+    that has it. Raises UnknownInterface for a class that is unknown, and ValueError for a constant.
     """
     match = _CONSTANT.fullmatch(text)
     if match is None or (match[1] is None and owner is None):
@@ -86,7 +86,7 @@ def constant(text: str, owner: type | None) -> object:
 
 
 def _class(path: str, owner: type | None) -> type:
-    """The class a path such as ``MoveRobot.Feedback`` names, in the package of `owner` or any."""
+    """Return the class of a path such as ``MoveRobot.Feedback``, in `owner`'s package or any."""
     place, slash, rest = path.rpartition("/")
     name, _, part = rest.partition(".")
     if owner is not None and path in PARTS:

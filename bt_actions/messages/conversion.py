@@ -66,7 +66,7 @@ class MessageError(ValueError):
 
 
 def fill(message_type: type[M], data: object, *, now: Callable[[], int] = time.time_ns) -> M:
-    """A message of a type from a mapping of its fields; what is not named keeps its default.
+    """Make a message of a mapping of its fields; a field that is not named keeps its default.
 
     `data` may hold message objects at any depth, and may be one of `message_type` already. `now`
     gives nanoseconds for `stamp: now`; pass the node's clock where there is one. Raises
@@ -76,7 +76,7 @@ def fill(message_type: type[M], data: object, *, now: Callable[[], int] = time.t
 
 
 def fill_value(kind: FieldType, data: object) -> object:
-    """A value of type `kind` as a tree has it: a byte is a number, an array stays what it is.
+    """Make a value of type `kind` as a tree has it: a byte is a number, an array stays an array.
 
     Raises MessageError.
     """
@@ -96,10 +96,10 @@ def _filled(kind: FieldType, data: object, now: Callable[[], int]) -> Any:
 def examine(
     kind: FieldType, data: object, hole: Hole = lambda _value, _kind, _path: False
 ) -> list[Problem]:
-    """What is wrong with the data; makes nothing.
+    """Return what is wrong with the data; makes nothing.
 
     `hole` is asked first about each value but a mapping, with the type it must have: True means
-    that it is settled there (a variable, whose type the caller checks).
+    that the value is settled there (a variable, whose type the caller checks).
     """
     filler = _Filler(time.time_ns, hole)
     filler.convert(kind, data, ())
@@ -107,7 +107,7 @@ def examine(
 
 
 def to_plain(message: object) -> Any:
-    """Dictionaries, lists and scalars that JSON can say (except NaN and infinities)."""
+    """Return dictionaries, lists and scalars that JSON can say (except NaN and infinities)."""
     fields = getattr(type(message), "get_fields_and_field_types", None)
     if fields is not None:
         types = fields()
@@ -123,7 +123,7 @@ def to_plain(message: object) -> Any:
 
 
 def dotted(path: Iterable[str | int]) -> str:
-    """``pose.position.x``, as paths are written everywhere."""
+    """Write a path as ``pose.position.x``, as everywhere."""
     return ".".join(str(part) for part in path)
 
 
@@ -138,7 +138,7 @@ class _Filler:
         self._owner: type | None = None
 
     def convert(self, kind: FieldType, value: object, path: Path) -> Any:
-        """What the field has to hold; None where the value is settled elsewhere, or wrong."""
+        """Return what the field has to hold; None where that is settled elsewhere, or wrong."""
         hole = None if isinstance(value, dict) else self._hole
         if hole is not None and hole(value, kind, path):
             return None
@@ -177,7 +177,7 @@ class _Filler:
         return message
 
     def _convenience(self, cls: type, value: object, path: Path) -> object:
-        """What may be written instead of the fields of a time, a duration or a quaternion."""
+        """Return the fields of a time, a duration or a quaternion that were written otherwise."""
         name = interface_name(cls)
         if name == "builtin_interfaces/msg/Time":
             return time_of(value, self._now)
@@ -188,7 +188,7 @@ class _Filler:
         return value
 
     def _angle(self, value: object, path: Path) -> float:
-        """In radians; one that is settled elsewhere is a number."""
+        """Return the radians; 0 for an angle that is settled elsewhere."""
         if self._hole is not None and self._hole(value, ANGLE, path):
             return 0.0
         return parse_angle(value)
@@ -227,7 +227,7 @@ class _Filler:
 
 
 def _numbers(name: str, items: Any) -> array.array[Any] | None:
-    """Numbers as rosidl keeps them, checked without a loop of Python's; None for what needs one."""
+    """Return numbers as rosidl keeps them, checked in C; None for numbers that need a loop."""
     if isinstance(items, array.array):
         return items
     kinds = set(map(type, items))
@@ -259,7 +259,7 @@ def _number(name: str, value: Any) -> object:
 
 
 def show(value: object) -> str:
-    """A value as a message shows it: as it is written in YAML where that is short."""
+    """Return a value as messages show it: as it is written in YAML where that is short."""
     if isinstance(value, Mapping):
         return "a mapping"
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""What a ROS message consists of, as plain values: for filling one, and for checking a tree.
+"""The fields of ROS messages as plain values: for filling a message, and for checking a tree.
 
 Read from the classes that rosidl generates; imports no rclpy.
 """
@@ -27,11 +27,8 @@ FLOATS = {"float32": 3.402823466e38, "float64": float("inf")}
 _NAMES = {"boolean": "bool", "octet": "byte", "float": "float32", "double": "float64"}
 
 
-_MESSAGES: dict[type, Message] = {}
-
-
 class FieldType:
-    """What a value is."""
+    """The type of a value."""
 
     __slots__ = ()
 
@@ -47,19 +44,11 @@ class Scalar(FieldType):
         return self.name if self.limit is None else f"{self.name}<={self.limit}"
 
 
+@dataclass(frozen=True, slots=True)
 class Message(FieldType):
-    """A message inside a message; there is one such object of each class."""
+    """A message inside a message."""
 
-    __slots__ = ("cls",)
     cls: type
-
-    def __new__(cls, of: type) -> Message:
-        made = _MESSAGES.get(of)
-        if made is None:
-            made = super().__new__(cls)
-            made.cls = of
-            made = _MESSAGES.setdefault(of, made)
-        return made
 
     def __str__(self) -> str:
         return short_name(self.cls)
@@ -81,7 +70,7 @@ class Listing(FieldType):
 
 @lru_cache(maxsize=4096)
 def describe(cls: type) -> Mapping[str, FieldType]:
-    """The fields of a message class in order, with their types."""
+    """Return the fields of a message class in order, with their types."""
     generated: Any = cls
     names = generated.get_fields_and_field_types()
     return {name: _type(slot) for name, slot in zip(names, generated.SLOT_TYPES, strict=True)}
@@ -95,7 +84,7 @@ def no_field(cls: type, name: str) -> str:
 
 @lru_cache(maxsize=4096)
 def constants(cls: type) -> Mapping[str, object]:
-    """The constants that a message class declares; one that is a byte as a number."""
+    """Return the constants that a message class declares; a byte is a number."""
     # rosidl keeps them on the metaclass, as properties and in a private dictionary.
     return {
         name: scalar(getattr(cls, name))

@@ -1,4 +1,4 @@
-"""Which actions, services and messages are installed, and their Python classes by name.
+"""The actions, services and messages that are installed, and their Python classes by name.
 
 Imports no rclpy, and imports a package only after seeing that it holds interfaces.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import importlib
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
@@ -35,7 +35,7 @@ class TwoTypes(TypeError):
     """A name of ROS is in use in this process with another type: nothing can be connected to it."""
 
     def __init__(self, name: str, kind: type, others: Iterable[str]) -> None:
-        """`others` are the full names of the types that it is in use with."""
+        """Name the type `kind` that was wanted, and the full names of the `others` in use."""
         known = sorted({*others} - {interface_name(kind)})
         also = f", and also as {', '.join(known)}" if known else ", and not with that type alone"
         super().__init__(f"{name} is used as {interface_name(kind)}{also}")
@@ -43,12 +43,11 @@ class TwoTypes(TypeError):
 
 @lru_cache(maxsize=1024)
 def interface(name: str | type, kind: Kind) -> type:
-    """The class of ``"pkg/action/Name"``; ``"pkg/Name"`` will do, since the kind is known.
+    """Return the class of ``"pkg/action/Name"``; ``"pkg/Name"`` will do, as the kind is known.
 
-    A class stands for itself.
+    A class stands for itself. A class that was found is not looked for again.
 
-    Raises UnknownInterface, which names the package, or what it holds instead. A class that was
-    found is looked for no more.
+    Raises UnknownInterface, which names the package, or what it holds instead.
     """
     if isinstance(name, type):
         return name
@@ -75,27 +74,40 @@ def interface(name: str | type, kind: Kind) -> type:
 
 @lru_cache(maxsize=256)
 def called(short: str, kind: Kind) -> type:
-    """What is meant by ``MoveRobot``, ``pkg/MoveRobot`` or the full name.
+    """Return the class of ``MoveRobot``, ``pkg/MoveRobot`` or the full name.
 
-    Raises UnknownInterface when there is none, or more than one; it names the candidates.
+    Raises UnknownInterface where none fits, or more than one; it names the candidates.
     """
     if "/" in short:
         return interface(short, kind)
-    names = installed(kind)
-    found = [name for name in names if name.rpartition("/")[2] == short]
+    return interface(full_name(short, installed(kind), _WORDS[kind]), kind)
+
+
+def full_name(wanted: str, names: Sequence[str], word: str) -> str:
+    """Return the one of `names` that `Fetch`, `my_msgs/Fetch` or the full name means.
+
+    Raises UnknownInterface where there is none, or more than one; `word` says of what kind.
+    """
+    package, _, short = wanted.rpartition("/")
+    found = [
+        name
+        for name in names
+        if name == wanted
+        or (name.rpartition("/")[2] == short and package in ("", name.partition("/")[0]))
+    ]
     if len(found) == 1:
-        return interface(found[0], kind)
-    word = _WORDS[kind]
+        return found[0]
     if found:
-        raise UnknownInterface(
-            f"{short!r} is more than one {word}, put the package before it: {', '.join(found)}"
-        )
-    near = did_you_mean(short, {name.rpartition("/")[2] for name in names})
-    raise UnknownInterface(f"no installed package has the {word} {short!r}{near}")
+        known = ", ".join(found)
+        raise UnknownInterface(f"{wanted!r} is more than one {word}, name it in full: {known}")
+    near = did_you_mean(
+        wanted, {each for name in names for each in (name, name.rpartition("/")[2])}
+    )
+    raise UnknownInterface(f"no installed package has the {word} {wanted!r}{near}")
 
 
 def installed(kind: Kind) -> list[str]:
-    """The full names of all installed interfaces of a kind."""
+    """Return the full names of all installed interfaces of a kind."""
     found: dict[str, tuple[str, ...]] = {}  # by package, as the first on the path has them
     for entry in sys.path:
         for file in Path(entry or ".").glob(f"*/{kind}/__init__.py"):
@@ -106,13 +118,13 @@ def installed(kind: Kind) -> list[str]:
 
 @lru_cache(maxsize=4096)
 def interface_name(cls: type) -> str:
-    """``"pkg/action/Name"`` of an interface's class."""
+    """Return ``"pkg/action/Name"`` of an interface's class."""
     package, kind = cls.__module__.split(".")[:2]
     return f"{package}/{kind}/{cls.__name__}"
 
 
 def short_name(cls: type) -> str:
-    """The class as people call it: ``MoveRobot.Goal``, ``SetBool.Request``, ``Pose``."""
+    """Return a class's name as people say it: ``MoveRobot.Goal``, ``SetBool.Request``, ``Pose``."""
     owner, _, part = cls.__name__.rpartition("_")
     is_part = owner and part in PARTS and ".msg" not in cls.__module__
     return f"{owner}.{part}" if is_part else cls.__name__
@@ -120,7 +132,7 @@ def short_name(cls: type) -> str:
 
 @lru_cache(maxsize=1024)
 def _listed(folder: Path) -> tuple[str, ...]:
-    """The interfaces of a package, read from the file that imports them: nothing is loaded.
+    """Return the interfaces of a package, read from the file that imports them: nothing is loaded.
 
     Generated folders import their own hidden modules by full name; others do not.
     """

@@ -15,10 +15,10 @@ ROS, and each package that was built before has its own. CMake looks through the
 
 The package's CMakeLists.txt says which files are generated, and is not run: an interface package
 as large as nav2_msgs calls macros of a package that is no wheel, and needs none of them for what
-rosidl makes. What a package stands on is read from the types that its files use.
+rosidl makes. The types that its files use tell what a package stands on.
 
-Everything but `installing.py` and `definition.py` runs in pip's build isolation, too, where
-nothing is installed but the pinned list: interfaces/backend.py builds our own packages so.
+All but `installing.py` runs in pip's build isolation, too, where nothing is installed but the
+pinned list: interfaces/backend.py builds our own packages so.
 """
 
 

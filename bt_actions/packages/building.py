@@ -8,12 +8,12 @@ from pathlib import Path
 
 from bt_actions.packages.environment import Tools
 from bt_actions.packages.generation import Progress, generate
-from bt_actions.packages.sources import Source
+from bt_actions.packages.sources import Package
 from bt_actions.packages.wheel import pack
 
 
 def build_wheels(
-    sources: Iterable[Source],
+    sources: Iterable[Package],
     tools: Tools,
     prefixes: Sequence[Path],
     out: Path,

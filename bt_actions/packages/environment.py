@@ -1,6 +1,6 @@
 """The build environment: CMake, Ninja and the generators of ROS, made once from pinned wheels.
 
-It lies in the cache of the user and is used by all environments of the same Python. Its name says
+Its folder lies in the user's cache, for all environments of the same Python. The folder's name says
 what it is made of, so that another list of pins makes another one; deleting it costs a download.
 """
 
@@ -40,19 +40,19 @@ class Tools:
 
 
 def pins() -> list[str]:
-    """The requirements of the build environment, each pinned."""
+    """Return the requirements of the build environment, each pinned."""
     lines = PINS.read_text(encoding="utf-8").splitlines()
     return [line for line in lines if line and not line.startswith("#")]
 
 
 def cache() -> Path:
-    """Where the build environment and the logs of builds are kept."""
+    """Return the folder of the build environment and of the logs of builds."""
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(home) / "bt_actions"
 
 
 def installer(python: Path | None = None) -> list[str]:
-    """The command that installs into the environment of `python`, else into this one: pip or uv.
+    """Return the command, pip's or uv's, that installs into `python`'s environment, or this one.
 
     Raises PackageError where there is neither.
     """
@@ -71,9 +71,9 @@ def _has_pip() -> bool:
 
 
 def build_environment(say: Callable[[str], None], *, network: bool) -> Tools:
-    """The build environment, made if it is not there yet, which downloads its wheels.
+    """Return the build environment; make it first, with a download, where it is missing.
 
-    Raises PackageError where it is not there and `network` is False, or it cannot be made.
+    Raises PackageError where it is missing and `network` is False, or cannot be made.
     """
     python = f"{sys.version_info.major}.{sys.version_info.minor}"
     base = f"{sys.base_prefix} {sys.version}"
@@ -127,8 +127,8 @@ def _run(command: list[str | Path]) -> None:
         )
 
 
-def here() -> Path:
-    """This environment's prefix, where the wheels of ROS put headers and CMake's exports.
+def own_prefix() -> Path:
+    """Return this environment's prefix, which has the headers and CMake exports of ROS's wheels.
 
     Raises PackageError where ROS does not come from wheels.
     """
@@ -142,9 +142,9 @@ def here() -> Path:
 
 
 def own_tools() -> Tools:
-    """The generators that are installed for this very process, as in pip's build isolation.
+    """Return the generators that are installed for this process, as in pip's build isolation.
 
-    Not sys.prefix: build isolation leaves the caller's there.
+    sys.prefix would not do: build isolation leaves the caller's there.
     """
     for file in distribution("ros-ament-cmake-core").files or ():
         if str(file).endswith("share/ament_cmake_core/package.xml"):
@@ -153,7 +153,7 @@ def own_tools() -> Tools:
 
 
 def variables(tools: Tools, prefixes: Sequence[Path] = ()) -> dict[str, str]:
-    """The environment variables of a process that builds with `tools` upon `prefixes`."""
+    """Return the environment variables of a process that builds with `tools` upon `prefixes`."""
     looked_in = os.pathsep.join(map(str, (tools.prefix, *prefixes)))
     return {
         **(_clean() if tools.site else os.environ),
@@ -167,7 +167,7 @@ def variables(tools: Tools, prefixes: Sequence[Path] = ()) -> dict[str, str]:
 
 
 def _clean() -> dict[str, str]:
-    """This process's variables without what leads another Python to our packages."""
+    """Return this process's variables without those that lead another Python to our packages."""
     mine = {"PYTHONPATH", "PYTHONHOME", "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE"}
     return {name: value for name, value in os.environ.items() if name not in mine}
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from bt_actions.packages import PackageError
 from bt_actions.packages.environment import Tools, cache, variables
 from bt_actions.packages.order import needs
-from bt_actions.packages.sources import Source
+from bt_actions.packages.sources import Package
 
 _REPAIR = Path(__file__).with_name("ros_wheels.cmake")
 _CMAKE_LISTS = """\
@@ -38,7 +38,7 @@ _COUNT = re.compile(r"\[(\d+)/(\d+)\]")
 
 
 def generate(
-    source: Source, prefixes: Sequence[Path], tools: Tools, work: Path, progress: Progress
+    source: Package, prefixes: Sequence[Path], tools: Tools, work: Path, progress: Progress
 ) -> Path:
     """Generate, compile and install `source` into a prefix in `work`, which is returned.
 
@@ -100,7 +100,7 @@ def _run(
     log: Path,
     done: Callable[[str], None],
 ) -> bool:
-    """Run one step; tell how far it is. It ends with this process's Ctrl-C, and all it started."""
+    """Run one step; tell how far it is. A Ctrl-C ends the step and all that it started."""
     with (
         log.open("a", encoding="utf-8") as file,
         subprocess.Popen(
@@ -122,7 +122,7 @@ def _run(
 
 
 def _reason(log: Path) -> str:
-    """What a log gives as the reason: the first exception of Python, or error of a compiler."""
+    """Return the reason that a log gives: Python's first exception, or a compiler's first error."""
     lines = [line for line in log.read_text(encoding="utf-8").splitlines() if line.strip()]
     for number, line in enumerate(lines):
         after = lines[number + 1 :]

@@ -10,11 +10,11 @@ from pathlib import Path
 
 from bt_actions.packages import PackageError
 from bt_actions.packages.environment import installer
-from bt_actions.packages.sources import Source
+from bt_actions.packages.sources import Package
 from bt_actions.packages.wheel import GENERATOR
 
 
-def check_names(sources: Iterable[Source]) -> None:
+def check_names(sources: Iterable[Package]) -> None:
     """Raise PackageError where a wheel would overwrite another's package, or a newer one."""
     for source in sources:
         try:
@@ -40,7 +40,7 @@ def check_names(sources: Iterable[Source]) -> None:
 
 
 def install(wheels: Iterable[Path]) -> None:
-    """Install `wheels` at once; a Ctrl-C waits for its end. Raises PackageError."""
+    """Install `wheels` at once; a Ctrl-C waits for the end. Raises PackageError."""
     command = [
         *installer(),
         "--quiet",
@@ -63,8 +63,8 @@ def install(wheels: Iterable[Path]) -> None:
         raise PackageError(f"the wheels were built, and could not be installed: {first.strip()}")
 
 
-def left_behind(sources: Iterable[Source]) -> list[str]:
-    """Installed packages that were compiled against another build of one of `sources`."""
+def left_behind(sources: Iterable[Package]) -> list[str]:
+    """Return the installed packages that were compiled against another build of `sources`."""
     built = {source.name for source in sources}
     return sorted(
         found.name

@@ -1,4 +1,4 @@
-"""Which packages are built, in which order, and on what each of them stands.
+"""The packages to build, in their order, and what each of them stands on.
 
 A type that is used is looked for among the packages that are built, then in the prefixes, then in
 packages that lie beside those that were named.
@@ -11,20 +11,20 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 from bt_actions.packages import PackageError
-from bt_actions.packages.sources import Source, read_manifest, read_source
+from bt_actions.packages.sources import Package, read_manifest, read_package
 from bt_actions.utilities.suggest import what_it_has
 
 
-def in_order(folders: Iterable[Path], prefixes: Sequence[Path]) -> list[Source]:
-    """The packages in `folders`, and those beside them that they need, each after what it uses.
+def in_order(folders: Iterable[Path], prefixes: Sequence[Path]) -> list[Package]:
+    """Return the packages in `folders` and those beside them that they need, needed ones first.
 
     Raises PackageError for a package that cannot be read, is given twice, or uses what is nowhere,
     and for a circle.
     """
-    sources: dict[str, Source] = {}
+    sources: dict[str, Package] = {}
     waiting = [folder.resolve() for folder in folders]
     while waiting:
-        source = read_source(waiting.pop(0))
+        source = read_package(waiting.pop(0))
         other = sources.setdefault(source.name, source)
         if other is not source and other.folder != source.folder:
             raise PackageError(
@@ -48,13 +48,13 @@ def in_order(folders: Iterable[Path], prefixes: Sequence[Path]) -> list[Source]:
         raise PackageError(f"these packages use each other in a circle: {circle}") from error
 
 
-def needs(source: Source) -> list[str]:
-    """The other packages whose messages its files use."""
+def needs(source: Package) -> list[str]:
+    """Return the other packages whose messages its files use."""
     return sorted({used.partition("/")[0] for used in source.uses} - {source.name})
 
 
 def messages_in(package: str, prefixes: Iterable[Path]) -> set[str]:
-    """The messages of an installed package; none where it is not installed for building upon."""
+    """Return the messages of a package; none where nothing can be built upon it."""
     for prefix in prefixes:
         share = prefix / "share" / package
         if (share / "cmake").is_dir():
@@ -62,8 +62,8 @@ def messages_in(package: str, prefixes: Iterable[Path]) -> set[str]:
     return set()
 
 
-def _beside(source: Source, package: str) -> list[Path]:
-    """The folder of a package that lies beside a source, if there is one."""
+def _beside(source: Package, package: str) -> list[Path]:
+    """Return the folder of a package that lies beside a source, if there is one."""
     for manifest in sorted(source.folder.parent.glob("*/package.xml")):
         try:
             name = read_manifest(manifest.parent).findtext("name") or ""
@@ -74,7 +74,7 @@ def _beside(source: Source, package: str) -> list[Path]:
     return []
 
 
-def _check_uses(source: Source, sources: dict[str, Source], prefixes: Sequence[Path]) -> None:
+def _check_uses(source: Package, sources: dict[str, Package], prefixes: Sequence[Path]) -> None:
     for used, place in source.uses.items():
         package, _, name = used.partition("/")
         built = sources.get(package)

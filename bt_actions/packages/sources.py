@@ -1,6 +1,6 @@
 """An interface package as it stands: its package.xml, its files, and the types they use.
 
-What cannot be generated is refused here, with its line: rosidl would say so in the middle of a
+Mistakes are refused here, with their lines: rosidl would tell of them in the middle of a
 long build, and in words of its own.
 """
 
@@ -25,7 +25,7 @@ _DEPENDS = {"depend", "build_depend", "exec_depend", "build_export_depend"}
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class Package:
     """A package that can be generated."""
 
     folder: Path
@@ -34,11 +34,11 @@ class Source:
     description: str
     license: str
     files: tuple[str, ...]
-    """Such as "action/Fetch.action"."""
+    """Their paths in the folder: "action/Fetch.action"."""
     uses: dict[str, str]
     """The messages that the files use, "geometry_msgs/Pose", each with its first place."""
     depends: frozenset[str]
-    """What package.xml says that it depends on, interface packages or not."""
+    """The dependencies in package.xml, interface packages or not."""
 
     @property
     def messages(self) -> set[str]:
@@ -49,7 +49,7 @@ class Source:
         return f"{self.name} {self.version}"
 
 
-def read_source(folder: Path) -> Source:
+def read_package(folder: Path) -> Package:
     """Read the package in `folder`. Raises PackageError, which names the file and the line."""
     manifest = read_manifest(folder)
     name, version = _text(manifest, "name"), _text(manifest, "version")
@@ -74,7 +74,7 @@ def read_source(folder: Path) -> Source:
     except CycleError as error:
         circle = " holds ".join(reversed(error.args[1]))
         raise PackageError(f"{folder}: a message cannot hold itself: {circle}") from error
-    return Source(
+    return Package(
         folder=folder,
         name=name,
         version=version,
@@ -87,7 +87,7 @@ def read_source(folder: Path) -> Source:
 
 
 def read_manifest(folder: Path) -> ET.Element:
-    """The content of package.xml. Raises PackageError."""
+    """Return the content of package.xml. Raises PackageError."""
     path = folder / "package.xml"
     try:
         return ET.fromstring(path.read_bytes())  # nosec B314
@@ -105,7 +105,7 @@ def _text(manifest: ET.Element, tag: str) -> str:
 
 
 def _files(folder: Path) -> tuple[str, ...]:
-    """The files that CMakeLists.txt names; where it names none, as it lists folders: all."""
+    """Return the files that CMakeLists.txt names; all files where it names none."""
     there = {
         str(path.relative_to(folder))
         for kind in KINDS
@@ -130,7 +130,7 @@ def _files(folder: Path) -> tuple[str, ...]:
 
 
 def _uses(package: str, folder: Path, file: str) -> dict[str, str]:
-    """The messages of any package that a file uses, with their places. Raises PackageError."""
+    """Return the messages that a file uses, with their places. Raises PackageError."""
     path = folder / file
     if not re.fullmatch(r"[A-Z][A-Za-z0-9]*", path.stem):
         raise PackageError(
@@ -170,7 +170,7 @@ def _uses(package: str, folder: Path, file: str) -> dict[str, str]:
 
 
 def _read_line(package: str, line: str, place: str) -> list[tuple[str | None, str]]:
-    """The field or constant of a line, if any: the message it uses, if any, and its name."""
+    """Return the names of a line's field or constants, each with the message that it uses."""
     from rosidl_adapter.parser import InvalidFieldDefinition, parse_message_string
 
     if line[:1].isspace() and line.strip() and not line.lstrip().startswith("#"):

@@ -16,18 +16,18 @@ from pathlib import Path
 from bt_actions.packages import PackageError
 from bt_actions.packages.environment import Tools, variables
 from bt_actions.packages.order import needs
-from bt_actions.packages.sources import Source
+from bt_actions.packages.sources import Package
 
 GENERATOR = "bt-actions interfaces"
-"""Who made a wheel, in its own words; wheels of others are never overwritten."""
+"""The name of the maker in our wheels; wheels of others are never overwritten."""
 _RUNTIME = ("ros-rosidl-default-runtime", "ros-rosidl-generator-py", "ros-action-msgs")
 _SHELL = {"environment", "hook", "parent_prefix_path"}
 _SHELL_SUFFIXES = {".bash", ".dsv", ".ps1", ".sh", ".zsh"}
-"""What makes a shell's environment from a prefix; the wheels of ROS do so in Python."""
+"""Of scripts that make a shell's environment; the wheels of ROS do so in Python."""
 
 
 def pack(
-    source: Source, prefix: Path, tools: Tools, built: Iterable[Source], work: Path, out: Path
+    source: Package, prefix: Path, tools: Tools, built: Iterable[Package], work: Path, out: Path
 ) -> Path:
     """Write the wheel of `source`, which lies in `prefix`, into `out`; return its path."""
     root = work / "wheel"
@@ -62,12 +62,12 @@ def _is_wanted(path: Path) -> bool:
 
 
 def _tag() -> str:
-    """The extension files carry no ABI in their names: the wheel says for which Python they are."""
+    """Return the Python that a wheel is for: its extension files carry no ABI in their names."""
     python = f"cp{sys.version_info.major}{sys.version_info.minor}"
     return f"{python}-{python}-{sysconfig.get_platform().replace('-', '_').replace('.', '_')}"
 
 
-def _metadata(source: Source, tools: Tools, built: Iterable[Source]) -> str:
+def _metadata(source: Package, tools: Tools, built: Iterable[Package]) -> str:
     python = f"{sys.version_info.major}.{sys.version_info.minor}"
     lines = [
         "Metadata-Version: 2.1",
@@ -82,8 +82,8 @@ def _metadata(source: Source, tools: Tools, built: Iterable[Source]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _requirements(source: Source, tools: Tools, built: Iterable[Source]) -> Sequence[str]:
-    """What the wheel stands on, in the very version: the layout of a message is compiled in."""
+def _requirements(source: Package, tools: Tools, built: Iterable[Package]) -> Sequence[str]:
+    """Return what the wheel needs, in exact versions: the layout of messages is compiled in."""
     found = {each.name: each.version for each in built}
     for each in distributions(path=[*tools.site, *sys.path]):
         found.setdefault(each.name, each.version)

@@ -1,14 +1,14 @@
-"""What this process has sent and no server has answered yet, on record should it be killed. No ROS.
+"""Goals of this process without an answer yet, on record should it be killed. No ROS.
 
 A server shows the goals that it has accepted. Of one that it has received, and has not decided on
 yet, nobody knows but the sender, and a sender that is killed tells nobody; the robot moves later.
 So each process has a file, named by what its goals' ids begin with (goals/ids.py), with a slot for
-each goal without an answer. It outlives a process that is killed, and cleanup reads it
+each goal without an answer. The file outlives a process that is killed, and cleanup reads it
 (recovery/sweep.py). It lies in memory (/dev/shm), in a directory that only this user may write to,
 and is mapped: a call of the system's for each goal would give Python's lock away.
 
 A slot is written before the goal is sent, and blank again when that has been answered; not where
-its server went away, which may only stand still. What is read is believed no further than that a
+its server went away, which may only stand still. A record proves no more than that a
 question about a goal is worth asking.
 """
 
@@ -53,13 +53,13 @@ class Sent(Entry):
 
     goal_id: bytes
     author: Author
-    """Who is dead, or not `here`."""
+    """The process, which is dead, or not `here`."""
     path: Path
     at: int
     """Where in the file its slot begins."""
 
     def strike(self) -> None:
-        """It need not be asked for any more; where that fails, it is."""
+        """Ask no more for this goal; where that cannot be written, it is asked for again."""
         self._write(_BLANK)
         with contextlib.suppress(OSError):
             if _is_blank(self.path):
@@ -91,7 +91,7 @@ class Ledger(Record):
         self._free: list[int] = []
 
     def __contains__(self, goal_id: bytes) -> bool:
-        """Whether a goal is on record."""
+        """Return whether a goal is on record."""
         return goal_id in self._slots
 
     def enter(self, goal_id: bytes, entry: Entry) -> None:
@@ -165,7 +165,7 @@ class Ledger(Record):
 def left_behind(passed_over: Collection[Path] = ()) -> Iterator[Sent | OSError]:
     """Find what this user's processes have left on record that are dead, or elsewhere.
 
-    Files in `passed_over` are not read. What cannot be read is told by an OSError in its place.
+    Files in `passed_over` are not read. For one that cannot be read an OSError comes.
     """
     try:
         home = directory(make=False)

@@ -51,11 +51,11 @@ class Answers:
         """Seconds for which all have answered it, the last time too."""
 
     def asked(self, number: int, of: frozenset[bytes], now: float) -> None:
-        """The question of this number was asked, `of` these servers."""
+        """Take note that the question of this number was asked, `of` these servers."""
         self._asked[number] = now, of
 
     def answered(self, number: int) -> bool:
-        """One server has answered the question of this number; return whether it was the last."""
+        """Take the answer of one server to this question; return whether it was the last."""
         if number not in self._asked:
             return False
         self._count[number] += 1
@@ -108,7 +108,7 @@ class RollCall:
         return self.servers - self._settled - self._shown
 
     def overdue(self, now: float) -> bool:
-        """Whether it is neither known nor on the way to it."""
+        """Return whether it is not `known`, and not about to be."""
         return not self.known and (not self._shown or now - self._complete_at >= SETTLE)
 
     def sees(self, shown: frozenset[bytes], now: float) -> None:
@@ -120,16 +120,16 @@ class RollCall:
         self._shown = shown
 
     def tells(self) -> None:
-        """A status has come, with all goals of its server: that is known which is alone."""
+        """Take note that a lone server has told its goals: nothing else need be known of it."""
         if len(self.servers) == 1:
             self._settled |= self.servers
 
     def due(self, now: float) -> bool:
-        """Whether to ask the next question now."""
+        """Return whether to ask the next question now."""
         return bool(self._shown) and now - self._asked_at >= ASK_AGAIN
 
     def asked(self, number: int, now: float) -> None:
-        """The question of this number was asked."""
+        """Take note that the question of this number was asked."""
         if self._asked_at and (self._complete_at <= self._asked_at or now - self._asked_at > LATE):
             self._answers.begin()
             self._settle = SETTLE_AFTER_SILENCE
@@ -163,7 +163,7 @@ class LeftBehind:
     takes: float = DENIED_FOR_GOOD
     """Seconds for which it has to be denied until it will not turn up any more."""
     awaited: bool = False
-    """It was sent, and no server has shown it yet; one may."""
+    """The goal was sent, and no server has shown it yet; one may."""
     nothing_left: str = ""
     """Why none will, or its end is not told: it need not be awaited."""
     denials: Answers = field(default_factory=Answers)

@@ -44,7 +44,7 @@ CANCELS_A_TURN = 5
 
 @dataclass(frozen=True, slots=True)
 class Swept:
-    """What a cleanup has seen."""
+    """The goals that a cleanup has seen."""
 
     left: list[LeftBehind]
     known: list[str]
@@ -56,7 +56,7 @@ class Swept:
     trouble: OSError | None
     """Why nobody can read what was sent and is not answered."""
     missing: list[str]
-    """Those of `unknown` that were looked for in vain."""
+    """The goals of `unknown` that were looked for in vain."""
     elsewhere: dict[bytes, str]
     """Unfinished goals of bt_actions processes on other machines, or in other containers, of which
     nobody here can tell whether they are alive: the action of each."""
@@ -220,7 +220,7 @@ class Cleanup:
         return {left.call for left in self._left.values()} | self._wanted
 
     def _awaits(self, now: float) -> bool:
-        """Whether a goal may turn up yet at a server in sight."""
+        """Return whether a goal may turn up yet at a server in sight."""
         return any(
             left.awaited and left.call.servers and now < self._deadline + left.takes + AWAIT_LONGER
             for left in self._left.values()
@@ -315,7 +315,7 @@ class Cleanup:
             self._read_before.discard(Path(self._trouble.filename))
 
     def _turns_up(self, left: LeftBehind) -> None:
-        """A server has it: it tells the end in a status."""
+        """Take note that a server has a goal: the server tells the end in a status."""
         if left.awaited or left.nothing_left:
             left.awaited, left.nothing_left, left.asked_at = False, "", NEVER
             if left.end is End.UNKNOWN:

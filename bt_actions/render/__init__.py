@@ -69,10 +69,9 @@ def dot(root: Behaviour, *, direction: str | None = None, depth: int | None = No
     ]
     numbers = {id(row.node): number for number, row in enumerate(nodes)}
     for number, row in enumerate(nodes):
-        shape, fill, font = look(row.node)
-        colour = f', fontcolor="{font}"' if font else ""
+        shape, fill = look(row.node)
         lines.append(
-            f'  n{number} [shape={shape}, fillcolor="{fill}"{colour}, '
+            f'  n{number} [shape={shape}, fillcolor="{fill}", '
             f"label=<{_label(row)}>, tooltip={_quoted(_tooltip(row.node))}];"
         )
         parent = row.node.parent

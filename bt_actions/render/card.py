@@ -1,4 +1,4 @@
-"""What there is to say about a node of a tree, as tables: policies, types, what it takes and gives.
+"""The card of a node, as tables: its policies, its types, its inputs and outputs.
 
 Most comes from the behaviour itself, so that a node made in Python has tables as well. Plain texts:
 escaping is the page's. Never ticks, sets up or changes a tree, and never imports rclpy.
@@ -10,21 +10,19 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from py_trees.behaviour import Behaviour
 
 from bt_actions.behaviours.variables import Var
 from bt_actions.goals.policy import Retry, Timeouts
+from bt_actions.messages import fields as ros_fields
+from bt_actions.messages.interfaces import PARTS, Kind, interface, interface_name, short_name
 from bt_actions.render.look import action_of
 
 if TYPE_CHECKING:
     from bt_actions.document.reading.tree import Document, TreeNode
 
-__all__ = ["Line", "Table", "describe", "interface_of", "tables"]
-
-Kind = Literal["action", "srv", "msg"]
-_PARTS = {"action": ("Goal", "Result", "Feedback"), "srv": ("Request", "Response")}
 _OURS = ("py_trees", "bt_actions")
 _DEEPEST = 3
 """Levels of messages inside a message."""
@@ -50,10 +48,10 @@ class Table(NamedTuple):
 
 
 def tables(node: Behaviour, written: TreeNode | None, document: Document | None) -> Iterator[Table]:
-    """What `node` takes and gives, and what it does when things go wrong.
+    """Return what `node` takes and gives, and what it does when things go wrong.
 
-    `written` is what it was made from, where that is a document; `document` is the tree whose root
-    it is, or which it includes.
+    `written` is the node of the document, where there is one; `document` is the tree whose root
+    `node` is, or which it includes.
     """
     if document is not None:
         yield from _ports(document)
@@ -72,7 +70,7 @@ def tables(node: Behaviour, written: TreeNode | None, document: Document | None)
 
 
 def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str, Kind] | None:
-    """The interface that a node uses, for `describe`; None where it uses none."""
+    """Return the interface that a node uses, for `describe`; None where it uses none."""
     kind: Kind
     for attribute, kind in (("action_type", "action"), ("service_type", "srv")):
         found = getattr(node, attribute, None)
@@ -85,19 +83,17 @@ def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str,
     return None
 
 
-def describe(interface: type | str, kind: Kind) -> Iterator[Table]:
-    """The messages of an interface with their fields and constants, or why they cannot be told."""
-    from bt_actions.messages import interfaces
-
+def describe(given: type | str, kind: Kind) -> Iterator[Table]:
+    """Return the fields and constants of an interface's messages, or why there are none to tell."""
     try:
-        found = interfaces.interface(interface, kind) if isinstance(interface, str) else interface
-        parts = [getattr(found, part, None) for part in _PARTS[kind]] if kind in _PARTS else [found]
-        for part in parts:
+        found = interface(given, kind)
+        parts = [getattr(found, part, None) for part, of in PARTS.items() if of == kind]
+        for part in parts or [found]:
             if isinstance(part, type) and hasattr(part, "get_fields_and_field_types"):
                 lines = tuple(islice(_fields(part, 0), _MOST_LINES + 1))
                 if len(lines) > _MOST_LINES:
                     lines = (*lines[:_MOST_LINES], Line("…", ""))
-                yield Table(interfaces.short_name(part), lines or (Line("no fields", ""),))
+                yield Table(short_name(part), lines or (Line("no fields", ""),))
     except (LookupError, ImportError) as error:
         yield Table("Type", (Line("cannot be read here", _cut(str(error))),))
 
@@ -106,7 +102,8 @@ def _action(node: Behaviour, *, from_python: bool) -> Iterator[Line]:
     action = action_of(node)
     assert action is not None
     yield Line("server", action[0])
-    yield Line("type", _type_name(getattr(node, "action_type", "")))
+    kind = getattr(node, "action_type", "")
+    yield Line("type", kind if isinstance(kind, str) else interface_name(kind))
     if from_python and hasattr(node, "goal"):
         yield Line("goal", _value(node.goal))
     expect = getattr(node, "expect", None)
@@ -151,8 +148,6 @@ def _ports(document: Document) -> Iterator[Table]:
 
 
 def _fields(message: type, depth: int) -> Iterator[Line]:
-    from bt_actions.messages import fields as ros_fields
-
     for name, kind in ros_fields.describe(message).items():
         if name == "structure_needs_at_least_one_member":  # what rosidl puts into an empty one
             continue
@@ -164,19 +159,12 @@ def _fields(message: type, depth: int) -> Iterator[Line]:
         yield Line(name, f"= {value!r}", depth)
 
 
-def _type_name(found: type | str) -> str:
-    if isinstance(found, str):
-        return found
-    package, _, rest = found.__module__.partition(".")
-    return f"{package}/{rest.partition('.')[0]}/{found.__name__}".replace("//", "/")
-
-
 def _seconds(seconds: float | None) -> str:
     return "none" if seconds is None else f"{seconds:g} s"
 
 
 def _condition(condition: Any) -> str:
-    """A condition as it was written, where it was written."""
+    """Return a condition as it was written, where it was written."""
     text = condition if isinstance(condition, str) else getattr(condition, "text", None)
     return _cut(text.strip()) if isinstance(text, str) else _function(condition)
 

@@ -1,4 +1,4 @@
-"""What a node of a tree looks like, for every picture and page of it: words, shape, colours.
+"""The look of a node, for every picture and page of a tree: words, shape, colours.
 
 Shapes are py_trees' own (octagon: fallback, box: sequence, parallelogram: parallel, ellipse:
 decorators and leaves). Draws and lays out nothing, never changes a tree, imports no rclpy.
@@ -12,24 +12,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 from py_trees.behaviour import Behaviour
-from py_trees.common import BlackBoxLevel
 from py_trees.composites import Composite, Parallel, Selector, Sequence
 from py_trees.decorators import Decorator
 
 from bt_actions.behaviours.parallel import Parallel as OwnParallel
 from bt_actions.utilities.plain_text import clean
-
-__all__ = [
-    "DOWN_UP_TO",
-    "Row",
-    "action_of",
-    "direction_of",
-    "kind",
-    "label",
-    "left_out",
-    "look",
-    "rows",
-]
 
 DOWN_UP_TO = 16
 """Leaves up to which a picture grows down, as py_trees draws; a wider one grows to the right."""
@@ -56,6 +43,13 @@ _WORDS = {
     "RetryChild": "retry",
     "SetValues": "set",
 }
+_LOOKS = (
+    (Selector, "octagon", "#8ee3ea"),
+    (Sequence, "box", "#ffc46b"),
+    (Parallel, "parallelogram", "#ffe070"),
+    ((Composite, Decorator), "ellipse", "#f4f4fc"),
+    (Behaviour, "ellipse", "#d4d8dd"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,23 +134,8 @@ def label(node: Behaviour) -> tuple[list[str], list[str]]:
     return textwrap.wrap(name, _LABEL_WIDTH) or [name], [clean(line) for line in under if line]
 
 
-def look(node: Behaviour) -> tuple[str, str, str | None]:
-    """Return the shape as py_trees draws it, its fill, lightened, and a font colour or None."""
-    if node.blackbox_level != BlackBoxLevel.NOT_A_BLACKBOX:
-        shape, _, _ = _shape(node)
-        return shape, "#333333", "#ffffff"
-    return _shape(node)
-
-
-def _shape(node: Behaviour) -> tuple[str, str, str | None]:
-    if isinstance(node, Selector):
-        return "octagon", "#8ee3ea", None
-    if isinstance(node, Sequence):
-        return "box", "#ffc46b", None
-    if isinstance(node, Parallel):
-        return "parallelogram", "#ffe070", None
-    if isinstance(node, Composite | Decorator):
-        return "ellipse", "#f4f4fc", None
+def look(node: Behaviour) -> tuple[str, str]:
+    """Return the shape of a node, as py_trees draws it, and its fill, lightened."""
     if action_of(node) is not None:
-        return "ellipse", "#bfd7ff", None
-    return "ellipse", "#d4d8dd", None
+        return "ellipse", "#bfd7ff"
+    return next((shape, fill) for kinds, shape, fill in _LOOKS if isinstance(node, kinds))

@@ -9,8 +9,6 @@ from py_trees.decorators import Decorator
 from bt_actions.render.look import action_of, kind, left_out, rows
 from bt_actions.utilities.plain_text import clean
 
-__all__ = ["text"]
-
 
 def text(root: Behaviour, *, encoding: str = "utf-8", depth: int | None = None) -> str:
     """Return `root` as lines of text, in plain ASCII where `encoding` has no box characters.

@@ -33,7 +33,7 @@ function draw() {
 
 function group_of(node) {
   const group = make("g", {
-    class: node.font ? "node dark" : "node", transform: `translate(${node.x} ${node.y})`,
+    class: "node", transform: `translate(${node.x} ${node.y})`,
     id: `n${node.index}`, role: "treeitem", tabindex: node === current ? 0 : -1,
     "aria-level": node.depth + 1, "aria-posinset": node.place_in,
     "aria-setsize": node.index ? nodes[node.parent].children.length : 1,

@@ -31,8 +31,6 @@ from bt_actions.render.outline import text
 from bt_actions.render.written import document_of, node_of, own_text
 from bt_actions.utilities.plain_text import clean
 
-__all__ = ["MOST_NODES", "OPEN_UP_TO", "page"]
-
 MOST_NODES = 20_000
 """Nodes of the largest tree that a page is made of."""
 OPEN_UP_TO = 40
@@ -69,7 +67,7 @@ def page(root: Behaviour, *, direction: str | None = None, depth: int | None = N
 
 
 def open_depth(nodes: Sequence[Row], most: int) -> int:
-    """The deepest level down to which there are at most `most` nodes; 1 at least."""
+    """Return the deepest level down to which there are at most `most` nodes; 1 at least."""
     levels = Counter(row.depth for row in nodes)
     shown, depth = 1, 0
     while levels[depth + 1] and shown + levels[depth + 1] <= most:
@@ -79,7 +77,7 @@ def open_depth(nodes: Sequence[Row], most: int) -> int:
 
 
 def _data(nodes: Sequence[Row], direction: str | None, depth: int | None) -> dict[str, object]:
-    """What the script draws. Tables are shared by number: nodes of one action say the same."""
+    """Return what the script draws. Nodes of one action share their tables, by number."""
     shared: dict[Table, int] = {}
     types: dict[object, list[Table]] = {}
     numbers: dict[int, int] = {}
@@ -94,7 +92,7 @@ def _data(nodes: Sequence[Row], direction: str | None, depth: int | None) -> dic
             if interface not in types:
                 types[interface] = list(describe(*interface))
             said += types[interface]
-        shape, fill, font = look(node)
+        shape, fill = look(node)
         name, under = label(node)
         one: dict[str, object] = {
             "parent": numbers[id(node.parent)] if row.depth else -1,
@@ -108,7 +106,6 @@ def _data(nodes: Sequence[Row], direction: str | None, depth: int | None) -> dic
         }
         place = place_of(node)
         more = {
-            "font": font,
             "place": None if place is None else str(place),
             "yaml": None if source is None else own_text(source),
         }

@@ -16,8 +16,6 @@ from bt_actions.document.findings import LOADED, NODE
 if TYPE_CHECKING:
     from bt_actions.document.reading.tree import Document, TreeNode
 
-__all__ = ["document_of", "node_of", "own_text"]
-
 _MOST_CHARACTERS = 4000
 _FAR = 1 << 30
 _Position = tuple[int, int]
@@ -25,19 +23,19 @@ _Position = tuple[int, int]
 
 
 def node_of(behaviour: Behaviour) -> TreeNode | None:
-    """The node of a document that `behaviour` was made from."""
+    """Return the node of a document that `behaviour` was made from."""
     return getattr(behaviour, NODE, None)
 
 
 def document_of(behaviour: Behaviour) -> Document | None:
-    """The tree whose inputs and outputs are `behaviour`'s: a loaded root, or a subtree."""
+    """Return the tree whose inputs and outputs are `behaviour`'s: a loaded root, or a subtree."""
     document: Document | None = getattr(getattr(behaviour, LOADED, None), "document", None)
     node = node_of(behaviour)
     return document or (None if node is None else node.included)
 
 
 def own_text(node: TreeNode) -> str:
-    """What stands in the document for `node`, comments too, its children left out as "…"."""
+    """Return the document's text of `node`, comments too, with its children left out as "…"."""
     start, end = (node.node.line, node.node.column), (node.node.end_line, node.node.end_column)
     lines = node.source.lines
     rest = _between(lines, end, (end[0], _FAR))

@@ -106,19 +106,16 @@ class RosTransport:
     # Requests; each raises what rclpy raises when the handle or the context is no longer valid
 
     def send(self, goal_id: bytes, goal: Any) -> None:
-        """Send the goal request."""
         request = self._impl.SendGoalService.Request(goal=goal)
         request.goal_id.uuid = list(goal_id)
         self.reachability.asked(self._ask("goal", request, goal_id))
 
     def ask_result(self, goal_id: bytes) -> None:
-        """Ask for the result, which the server answers when the goal has ended."""
         request = self._impl.GetResultService.Request()
         request.goal_id.uuid = list(goal_id)
         self._ask("result", request, goal_id)
 
     def cancel(self, goal_id: bytes) -> None:
-        """Ask the server to cancel this goal, and no other."""
         request = CancelGoal.Request()
         request.goal_info.goal_id.uuid = list(goal_id)
         self.reachability.asked(self._ask("cancel", request, goal_id))
@@ -135,7 +132,6 @@ class RosTransport:
         return question.asked
 
     def forget(self, goal_id: bytes) -> None:
-        """Drop what is still filed for a goal."""
         with self._lock:
             for key in [key for key, asked in self._questions.items() if asked.goal_id == goal_id]:
                 question = self._questions.pop(key)
@@ -147,7 +143,6 @@ class RosTransport:
     # Answers
 
     def deliver_arrived(self) -> None:
-        """Take and deliver what has arrived, here and now, whether or not somebody spins."""
         self.take_data()
         self.deliver()
 
@@ -207,28 +202,23 @@ class RosTransport:
 
     @property
     def has_more(self) -> bool:
-        """Whether something has been taken, and not been delivered yet."""
         return bool(self._inbox)
 
     # Discovery
 
     def servers(self) -> frozenset[bytes]:
-        """Return the GIDs of the servers in sight; raises InvalidHandle where the node is gone."""
         return servers(self._node, self._name)
 
     def count(self) -> int:
-        """How many readers of goal requests are shown, at a tenth of the cost of `servers`."""
         node = self._node.handle
         with node:
             return int(node.get_count_services(self._counted))
 
     def ready(self) -> bool:
-        """Whether all parts of a server are in sight; raises InvalidHandle as well."""
         with self._node.handle:
             return bool(self.handle.is_action_server_available())
 
     def close(self) -> None:
-        """Destroy the client. Answers that are still under way are lost."""
         with self._lock:
             if self.closed:
                 return

@@ -131,7 +131,6 @@ class Subscription(_Topic):
         return max(super().may_come(), arrives)
 
     def close(self) -> None:
-        """Unsubscribe."""
         self._node.destroy_subscription(self._subscription)
 
 
@@ -152,11 +151,9 @@ class Publisher(_Topic):
 
     @property
     def listeners(self) -> int:
-        """How many subscriptions get what is published."""
         return int(self._publisher.get_subscription_count())
 
     def publish(self, message: Any) -> None:
-        """Publish; returns at once."""
         self._publisher.publish(message)
         self._has_all_by = time.monotonic() + ARRIVES
 
@@ -187,11 +184,9 @@ class Service:
 
     @property
     def ready(self) -> bool:
-        """Whether the service is there."""
         return bool(self._client.service_is_ready())
 
     def why_nobody(self) -> str:
-        """What the graph shows in place of the service, behind a colon."""
         node, kind, known = self._node, interface_name(self._type), dict[str, list[str]]()
         with contextlib.suppress(Exception):  # our node was destroyed
             for name, kinds in node.get_service_names_and_types():
@@ -206,12 +201,10 @@ class Service:
         return ""
 
     def call(self, request: Any) -> Call:
-        """Begin a call, which wakes who has called when it is done."""
         future: Any = self._client.call_async(request)
         wake = waker()
         future.add_done_callback(lambda _: wake())
         return future  # type: ignore[no-any-return]
 
     def close(self) -> None:
-        """Destroy the client."""
         self._node.destroy_client(self._client)

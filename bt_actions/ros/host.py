@@ -50,7 +50,6 @@ class RosHost:
         self._thread: threading.Thread | None = None
 
     def domain(self, number: int) -> Domain:
-        """Return what is shared in the ROS domain of this number."""
         with self.lock:
             return self.domains.setdefault(number, Domain())
 

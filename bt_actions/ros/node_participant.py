@@ -97,24 +97,17 @@ class NodeParticipant:
     # What leaves ask for
 
     def log(self, level: str, text: str) -> None:
-        """Write a line to the node's log."""
         log.by(self.node.get_logger().name, level, text)
 
     # What traffic asks for
 
     def alive(self) -> bool:
-        """Whether the node is there, and its context was not shut down."""
         return is_valid(self.node)
 
     def shut_down(self) -> bool:
-        """Whether the context was shut down; else who is not alive was destroyed."""
         return is_shut_down(self.node)
 
     def full_name(self, action: str) -> str:
-        """Return the full name of the server that goals for an action go to.
-
-        Raises ValueError for a name that ROS refuses.
-        """
         if action not in self._servers:
             full = expand_topic_name(action, self.name, self.namespace)
             self._servers[action] = server = server_name(self.node, full)
@@ -133,10 +126,6 @@ class NodeParticipant:
         return transport
 
     def seek(self, seeker: Seeker) -> None:
-        """Have a new participant look for what is missed.
-
-        Not where remapping rules give our node parts of several servers.
-        """
         if self._is_one_server(seeker.name):
             look_for(seeker, self.domain, self._enclave)
 
@@ -158,11 +147,9 @@ class NodeParticipant:
         )
 
     def unheard(self) -> str:
-        """Say, as the end of a sentence, what may keep a server in sight from answering; or ""."""
         return of_other_users()
 
     def instead(self, action_type: Any, name: str) -> str:
-        """Say what is in sight where the action is not: another type, or a name like it."""
         actions, ours = dict[str, str](), interface_name(action_type)
         try:
             for topic, _ in self.node.get_topic_names_and_types():

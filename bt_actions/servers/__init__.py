@@ -1,1 +1,1 @@
-"""What can be known of the server on the other side. No ROS, no thread."""
+"""Knowledge of the server on the other side. No ROS, no thread."""

@@ -1,4 +1,4 @@
-"""What is known of one action server, seen from outside: is it there, alone, and still the same?
+"""One action server, seen from outside: is it there, alone, and still the same?
 
 Fed with what discovery shows (readiness, and the GIDs of who reads goal requests) and with the
 answers to probes. No ROS, no thread, no clock of its own; it sends nothing: `wants_probe` says
@@ -36,7 +36,7 @@ counts as gone."""
 
 
 class Server(Enum):
-    """What answers under the name."""
+    """The servers that answer under a name."""
 
     ABSENT = "absent"
     READY = "ready"
@@ -107,7 +107,7 @@ class ServerWatch:
         )
 
     def alone_since(self, now: float, moment: float) -> bool:
-        """Whether only one server answers, and only one has answered what was sent since `moment`.
+        """Return whether one server answers alone, now and to all that was sent since `moment`.
 
         So whoever has answered anything at `moment` is the only one.
         """
@@ -143,7 +143,7 @@ class ServerWatch:
         return self._most_answers > 1
 
     def all_live(self, now: float) -> bool:
-        """Whether all that are shown live, and more than one are: so many answered one question.
+        """Return whether more than one is shown, and all live: so many answered one question.
 
         Or two did, and a dead one would not be shown any more.
         """
@@ -162,7 +162,7 @@ class ServerWatch:
         return Server.READY if self.alone else Server.UNCLEAR
 
     def wants_probe(self, now: float, *, runs: bool = False) -> bool:
-        """Whether a probe is due; the caller sends one when this says so.
+        """Return whether a probe is due; the caller sends one when this says so.
 
         `runs`: goals may run here, so that it matters whether one that is not ready is gone.
         """
@@ -174,7 +174,7 @@ class ServerWatch:
         return True
 
     def gone(self, now: float, sent_to: frozenset[GID]) -> bool:
-        """Whether none of the servers that a goal was sent to is there any more.
+        """Return whether none of the servers that a goal was sent to is there any more.
 
         One that is not ready is gone if nothing is heard, and no other is in sight: readiness is
         that of the name, and a second server that is discovered in part takes it away.
@@ -185,5 +185,5 @@ class ServerWatch:
         return not self.is_crowded and now - silent_since >= NOT_READY_FOR
 
     def changed(self, sent_to: frozenset[GID]) -> bool:
-        """Whether a server is shown that was not there when the goal was sent."""
+        """Return whether a server is shown that was not there when the goal was sent."""
         return bool(self.gids - sent_to)

@@ -55,9 +55,9 @@ class Reachability:
             self._ask_at = [asked]  # who answers what was asked before is not busy
 
     def doubt(self, now: float, ask_after: tuple[float, ...] = AT_ONCE) -> None:
-        """What was heard before proves nothing, as this process stood still: it is to be asked.
+        """Doubt what was heard before, as this process stood still: the server is to be asked.
 
-        Where a doubt is open, it has been asked already.
+        Where a doubt is open, the server has been asked already.
         """
         if not self.in_doubt(now):
             self._ask_at, self._tries = [now + seconds for seconds in ask_after], 0
@@ -69,19 +69,19 @@ class Reachability:
         return max(0.0, self._in_doubt_until - now)
 
     def take_question(self, now: float) -> bool:
-        """Whether to ask something now, just in order to be answered; it is not asked for twice."""
+        """Return whether to ask just in order to be answered; each question is due once."""
         if not self._ask_at or now < self._ask_at[0]:
             return False
         del self._ask_at[0]
         return True
 
     def tried(self, now: float) -> None:
-        """Another way is looked for from now on."""
+        """Take note that another way is looked for from now on."""
         self._tries += 1
         self._tried_at = now
 
     def is_unresponsive(self, now: float) -> bool:
-        """Whether there was no answer to any question for long, and another way may be looked for.
+        """Return whether no question was answered for long, and another way may be looked for.
 
         Also while that is done.
         """

@@ -1,4 +1,4 @@
-"""What servers say of one goal, and what of it is believed.
+"""The words of servers on one goal, and which of them are believed.
 
 One server's word does not speak for another's: where a second one opened, or woke up, when the
 request was on its way, both may have the goal; what one of them denies, refuses or has ended, the
@@ -30,7 +30,7 @@ from bt_actions.goals.terms import (
 from bt_actions.servers.presence import GID, Server, ServerWatch
 
 Told = tuple[Event, Any] | None
-"""What the goal is to be told, with its detail; None: nothing."""
+"""The event for the goal, with its detail; None: nothing."""
 ASK_EVERY = 0.5
 """Seconds between two questions for a goal while another server is in sight."""
 DENIALS = (CANCEL_UNKNOWN_GOAL, (0, None))
@@ -40,7 +40,7 @@ OVERTAKEN = 1.0
 
 
 class Replies:
-    """What is believed of what servers say of one goal.
+    """The judgement of the words of servers on one goal.
 
     `answers` are always all those that one question has had by now, the newest last, and `asked` is
     when it was asked (seconds, steady clock).
@@ -48,7 +48,7 @@ class Replies:
 
     def __init__(self, goal: Goal) -> None:
         self.sent_to: frozenset[GID] = frozenset()
-        """Who was shown when the request went out, and may have taken it."""
+        """The servers that were shown when the request went out, and may have taken it."""
         self._goal = goal
         self._was_gone = False
         """When last looked at, none of these was there."""
@@ -62,7 +62,7 @@ class Replies:
         self._one_left_or_came = False  # since the last look
         self._told_of_two = self._runs_anew = False
         self._fresh_since = NEVER
-        """What was asked before may have been answered by who is gone, or did not have it yet."""
+        """Earlier questions may have been answered by a server that is gone, or had no goal yet."""
 
     def sent(self, watch: ServerWatch) -> None:
         """Take note of who is shown when the request goes out, just before and just after."""
@@ -72,13 +72,16 @@ class Replies:
             self._crowd = watch.gids
 
     def taken_over(self) -> None:
-        """Another node sees to the goal from now on, and has not seen its server yet."""
+        """Take note that another node sees to the goal now, and has not seen its server yet."""
         self._was_gone = True
         self._one_left_or_came = False
         self._crowd = self._in_sight = frozenset()
 
     def taken_by_two(self, servers: frozenset[GID], now: float) -> None:
-        """It has ended at one of these, which tells that again, and another one runs it."""
+        """Take note that the goal has ended at one of these, and runs at another.
+
+        The one at which it has ended tells the end again.
+        """
         self.sent_to, self._fresh_since = servers, now
         self._told_of_two = self._runs_anew = True
 
@@ -224,7 +227,7 @@ class Replies:
         return None
 
     def _note_changes(self, watch: ServerWatch, now: float) -> None:
-        """Who has left may have answered what was asked before; who is back was not asked."""
+        """Note which servers left, and may have answered before, and which are back, unasked."""
         crowd = watch.gids if _is_crowded(watch) else frozenset[GID]()
         left, came = self._crowd - watch.gids, (watch.gids - self._in_sight) & self.sent_to
         if left or (came and len(self.sent_to) > 1):
@@ -251,7 +254,7 @@ class Replies:
         self._ended, self._refused, self._denied_at = None, False, math.inf
 
     def _may_be_at_two(self, watch: ServerWatch) -> bool:
-        """Whether two of the servers that it was sent to are there, as far as is known."""
+        """Return whether two of the servers that it was sent to are there, as far as is known."""
         return _is_crowded(watch) and len(self.sent_to & watch.gids) > 1
 
 

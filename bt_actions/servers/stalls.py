@@ -47,7 +47,7 @@ class _Grace:
 
 
 class Stalls:
-    """What is to be borne with, after stalls, at any moment (seconds of the steady clock)."""
+    """The time to wait for, after stalls, at any moment (seconds of the steady clock)."""
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class Stalls:
     ) -> None:
         """`idle` returns the seconds in which this process did nothing, asleep or stopped.
 
-        `clock` returns the moment that it is: who asks may have looked at it before a stall.
+        `clock` returns the moment that it is: a caller may have looked at it before a stall.
         A garbage collection is no stall, as it is work: the middleware's own threads go on.
         """
         self.long_times = 0
@@ -84,14 +84,14 @@ class Stalls:
         return borne
 
     def sleeps(self, now: float, until: float) -> None:
-        """The next sign of life is meant to come by `until`."""
+        """Expect the next sign of life by `until`."""
         self._due = self._idle(now) + until - now
 
     def rests(self, now: float) -> None:
-        """There will be no sign of life for a while, of which nobody will know why.
+        """Expect no sign of life for a while.
 
-        Where it is long enough, it counts as one of the `long_times`: whoever goes on then is to
-        ask whether it is still heard. Nothing is held up for it, as nothing is under way.
+        A rest that is long enough counts as one of the `long_times`: whoever goes on then is to ask
+        whether it is still heard. Nothing is held up for it, as nothing is under way.
         """
         self._due, self._rests_since = math.inf, now
 

@@ -2,7 +2,7 @@
 
 A file that changed is read again when somebody asks. One that no longer checks keeps its last good
 version; so does one that cannot be read soon, which is not waited for again before it has been.
-What a tree includes, imports or reads must lie in the named folders, or be linked there.
+All files of a tree must lie in the named folders, or be linked there.
 """
 
 from __future__ import annotations
@@ -18,14 +18,12 @@ from functools import partial
 from pathlib import Path
 
 from bt_actions.document import DocumentError, Finding, Tree, open_tree
+from bt_actions.document.reading.find import is_tree_file
 from bt_actions.serving.requests import Refused, Said, inputs_of
 from bt_actions.utilities.patience import Patience
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import did_you_mean
 
-__all__ = ["Catalog", "Entry", "State"]
-
-_SUFFIXES = (".yaml", ".yml")
 _LONGEST_NAME = 60
 """Characters of a name that nobody knows in what is said of it."""
 PATIENCE = 2.0
@@ -59,7 +57,7 @@ class Entry:
     """The latest version that checks; None where there was none."""
     digest: str
     findings: tuple[Said, ...]
-    """What is wrong with the file as it is now."""
+    """The mistakes in the file as it is now."""
     stamps: Mapping[Path, _Stamp]
     hides: tuple[Path, ...] = ()
     """Files of the same name that are not served."""
@@ -99,12 +97,12 @@ class Catalog:
         self._lock = threading.Lock()
         self._entries: dict[str, Entry] = {}
         self._listed: dict[Path, list[Path]] = {}
-        """What each folder held when it was last looked into."""
+        """The files of each folder, as of the last look."""
         self._there: list[Path] = []
         """The folders that answer."""
 
     def entries(self) -> list[Entry]:
-        """All trees, by name."""
+        """Return all trees, by name."""
         with self._lock, self._patience:
             found = [self._entry(name, paths) for name, paths in sorted(self._files().items())]
             self._entries = {each.name: each for each in found if each is not None}
@@ -112,7 +110,7 @@ class Catalog:
             return list(self._entries.values())
 
     def find(self, name: str) -> Entry:
-        """The tree of this name, as it is now. Raises Refused."""
+        """Return the tree of this name, as it is now. Raises Refused."""
         with self._lock, self._patience:
             files = self._files()
             entry = self._entry(name, files.get(name, ()))
@@ -124,7 +122,7 @@ class Catalog:
             return entry
 
     def check(self, name: str, inputs: str) -> tuple[Entry, Tree, Mapping[str, object]]:
-        """What a goal would run: the tree as it is now, and the values of its inputs.
+        """Return the tree that a goal would run, as it is now, and the values of its inputs.
 
         Raises Refused, which says what is wrong.
         """
@@ -141,7 +139,7 @@ class Catalog:
         return entry, entry.tree, values
 
     def _files(self) -> dict[str, list[Path]]:
-        """The files of each name, in the order of the folders."""
+        """Return the files of each name, in the order of the folders."""
         self._there = []
         for folder in self.folders:
             with contextlib.suppress(TimeoutError):
@@ -156,13 +154,13 @@ class Catalog:
         return found
 
     def _same(self, file: Path, other: Path) -> bool:
-        """Whether a file is another by a second path, as far as anybody can tell."""
+        """Return whether a file is another by a second path, as far as anybody can tell."""
         with contextlib.suppress(OSError):  # TimeoutError is one
             return self._patience((file, other), partial(file.samefile, other))
         return False
 
     def _entry(self, name: str, files: Sequence[Path]) -> Entry | None:
-        """The entry of the first of some files that holds a tree, as it is now."""
+        """Return the entry of the first of some files that holds a tree, as it is now."""
         before = self._entries.get(name)
         for number, file in enumerate(files):
             known = before if before is not None and before.file == file else None
@@ -209,11 +207,7 @@ def _trees_in(folder: Path) -> list[Path]:
         files = sorted(folder.iterdir())
     except OSError:
         return []
-    return [
-        each
-        for each in files
-        if each.suffix in _SUFFIXES and each.name[0] != "." and clean(each.stem) == each.stem
-    ]
+    return [each for each in files if is_tree_file(each) and clean(each.stem) == each.stem]
 
 
 def _holds_no_tree(findings: Iterable[Finding]) -> bool:
@@ -222,14 +216,13 @@ def _holds_no_tree(findings: Iterable[Finding]) -> bool:
 
 def _said(finding: Finding) -> Said:
     hint = f" ({finding.hint})" if finding.hint else ""
-    place = f"{finding.file}:{finding.line}:{finding.column}"
-    return Said(finding.code, f"{finding.message}{hint}", place)
+    return Said(finding.code, f"{finding.message}{hint}", str(finding.place))
 
 
 def _stamp(path: Path, *, before: int | None = None) -> _Stamp:
-    """What tells a file from what it was; None where it is not there, or not older than `before`.
+    """Return what identifies a version of a file; None where it is missing, or too new.
 
-    Which has been written just now may be written again without another time of change.
+    A file that is not older than `before` may change again without another time of change.
     """
     try:
         status = path.stat()
@@ -245,7 +238,7 @@ def _unchanged(stamps: Mapping[Path, _Stamp]) -> bool:
 
 
 def _digest(files: Mapping[Path, str]) -> str:
-    """Of all files that a version is made of, in the order of their names."""
+    """Return the digest of all files of a version, in the order of their names."""
     digest = hashlib.sha256()
     for path, text in sorted(files.items()):
         data = text.encode("utf-8", "surrogatepass") or _bytes(path)

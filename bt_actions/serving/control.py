@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 from bt_actions_interfaces.srv import ControlTree
 
-from bt_actions.serving.goal import Goal
+from bt_actions.serving.rejections import ECHO
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import listing
 
-__all__ = ["Control", "Step"]
+if TYPE_CHECKING:
+    from bt_actions.serving.goal import Goal
 
-ECHO = 200
-"""Characters of the caller's own words in what is said of it."""
-
-
-class Step(NamedTuple):
-    """What a command does."""
-
-    word: str
-    do: Callable[[Goal], None]
+COMMANDS = {
+    "pause": ControlTree.Request.PAUSE,
+    "resume": ControlTree.Request.RESUME,
+    "halt": ControlTree.Request.HALT,
+}
 
 
 class Control:
@@ -40,10 +37,10 @@ class Control:
         say: Callable[[Goal, str], None],
     ) -> None:
         self._goals, self._say = goals, say
-        self._steps = {
-            ControlTree.Request.PAUSE: Step("pause", lambda goal: goal.run.pause()),
-            ControlTree.Request.RESUME: Step("resume", lambda goal: goal.run.resume()),
-            ControlTree.Request.HALT: Step("halt", halt),
+        self._does: dict[str, Callable[[Goal], None]] = {
+            "pause": lambda goal: goal.run.pause(True),
+            "resume": lambda goal: goal.run.pause(False),
+            "halt": halt,
         }
 
     def answer(
@@ -52,9 +49,10 @@ class Control:
         """Do what is asked for, or say why not; the callback of the service."""
         goals = self._goals()
         goal_id = bytes(request.goal_id.uuid)
-        goal, step = goals.get(goal_id), self._steps.get(request.command)
-        if step is None:
-            known = listing(f"{each.word} ({number})" for number, each in self._steps.items())
+        goal = goals.get(goal_id)
+        word = next((each for each in COMMANDS if COMMANDS[each] == request.command), None)
+        if word is None:
+            known = listing(f"{each} ({number})" for each, number in COMMANDS.items())
             response.message = f"{request.command} is no command; {known} are"
         elif goal is None:
             wrong = f"no goal {goal_id.hex()} runs here" if any(goal_id) else "no goal id is given"
@@ -62,7 +60,7 @@ class Control:
             response.message = f"{wrong}; {f'there is {there}' if goals else 'nothing runs here'}"
         else:
             asks = clean(request.requested_by)[:ECHO]
-            self._say(goal, f"{step.word} asked for by {asks or 'a client'}")
-            step.do(goal)
+            self._say(goal, f"{word} asked for by {asks or 'a client'}")
+            self._does[word](goal)
             response.accepted = True
         return response

@@ -13,8 +13,6 @@ from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.serving.catalog import State
 from bt_actions.serving.outcome import RunOutcome
 
-__all__ = ["Diagnostics", "Standing", "judge"]
-
 PERIOD = 1.0
 """Seconds."""
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -34,7 +32,7 @@ class Standing(NamedTuple):
 
 
 def judge(standing: Standing, refuses: str) -> tuple[bytes, str]:
-    """The level of a tree, and why; `refuses` says why its server accepts nothing."""
+    """Return the level of a tree, and why; `refuses` says why its server accepts nothing."""
     last, running = standing.last, standing.running
     if refuses:
         return ERROR, f"not serving: {refuses}"

@@ -8,8 +8,6 @@ from typing import Any
 from bt_actions.serving.messages import feedback
 from bt_actions.serving.run import Run
 
-__all__ = ["FASTEST", "Goal"]
-
 FASTEST, SLOWEST = 0.1, 1.0
 """Seconds between two messages of feedback: where something has changed, and where nothing has."""
 
@@ -23,7 +21,7 @@ class Goal:
     run: Run
     tree: str
     begins: str = ""
-    """What is said when it begins."""
+    """The line in the log when the goal begins."""
     begun_at: float | None = None
     """When it began, on the steady clock; None while it waits for its turn."""
     _told: int = -1
@@ -41,7 +39,7 @@ class Goal:
 
     @property
     def label(self) -> str:
-        """What tells its run from others of the tree."""
+        """A name that sets its run apart from others of the tree."""
         return f"{self.tree} {self.id.hex()}"
 
     def tell(self, now: float) -> None:

@@ -1,11 +1,11 @@
-"""What is told of trees and runs, as messages of bt_actions_interfaces. No node, no state."""
+"""Trees and runs as messages of bt_actions_interfaces. No node, no state."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 from bt_actions_interfaces.action import RunTree
-from bt_actions_interfaces.msg import ActionReport, Finding, RunningLeaf, TreeInfo, TreeInput
+from bt_actions_interfaces.msg import ActionReport, Finding, TreeInfo, TreeInput
 from builtin_interfaces.msg import Duration
 from unique_identifier_msgs.msg import UUID
 
@@ -16,11 +16,9 @@ from bt_actions.serving.run import Run
 from bt_actions.serving.story import warnings_of
 from bt_actions.utilities.plain_text import as_json
 
-__all__ = ["feedback", "finding", "info", "result"]
-
 
 def result(outcome: RunOutcome) -> RunTree.Result:
-    """What a goal is answered with."""
+    """Return the answer to a goal."""
     return RunTree.Result(
         error_code=outcome.code,
         error_msg=outcome.message,
@@ -31,9 +29,9 @@ def result(outcome: RunOutcome) -> RunTree.Result:
 
 
 def feedback(run: Run, *, begun: bool) -> RunTree.Feedback:
-    """How far a run is."""
+    """Return how far a run is."""
     return RunTree.Feedback(
-        running=[RunningLeaf(**leaf._asdict()) for leaf in run.running()],
+        running=run.running(),
         leaves_ended=run.leaves_ended,
         paused=run.paused,
         waiting=not begun,
@@ -41,12 +39,12 @@ def feedback(run: Run, *, begun: bool) -> RunTree.Feedback:
 
 
 def finding(said: Said) -> Finding:
-    """One thing that is wrong."""
+    """Return one thing that is wrong."""
     return Finding(**said._asdict())
 
 
 def info(entry: Entry, goals: Iterable[tuple[UUID, Run, bool]]) -> TreeInfo:
-    """A tree that can be run, and the goals of it: the run of each, and whether that has begun."""
+    """Return a tree, and of each of its goals the run, and whether that has begun."""
     tree, goals = entry.tree, list(goals)
     return TreeInfo(
         name=entry.name,
@@ -73,14 +71,7 @@ def info(entry: Entry, goals: Iterable[tuple[UUID, Run, bool]]) -> TreeInfo:
 
 
 def _action(each: ActionOutcome) -> ActionReport:
-    seconds = int(each.duration)
-    return ActionReport(
-        path=each.path,
-        server=each.server,
-        attempts=min(each.attempts, 65535),
-        outcome=each.outcome,
-        end=each.end,
-        reason=each.reason,
-        duration=Duration(sec=seconds, nanosec=int((each.duration - seconds) * 1e9)),
-        place=each.place,
-    )
+    whole, rest = divmod(each.duration, 1)
+    duration = Duration(sec=int(whole), nanosec=int(rest * 1e9))
+    few = {"attempts": min(each.attempts, 65535), "duration": duration}
+    return ActionReport(**each._asdict() | few)

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
-
-__all__ = ["ENDS", "OUTCOMES", "ActionOutcome", "Code", "Ending", "RunOutcome", "outcome_of"]
 
 SEPARATOR = " / "
 """Between the names of a path."""
@@ -47,7 +46,7 @@ ENDS = {
 
 
 class Ending(enum.Enum):
-    """Who ended a run before its time, with the code and the words for it."""
+    """The ways to end a run before its time, with the code and the words of each."""
 
     CANCELED = (Code.CANCELED, "a client canceled it")
     REPLACED = (Code.REPLACED, "a newer goal replaced it")
@@ -56,9 +55,8 @@ class Ending(enum.Enum):
     SERVER_ENDS = (Code.DEACTIVATED, "its server ends")
 
 
-@dataclass(frozen=True, slots=True)
-class ActionOutcome:
-    """What became of one action; see ActionReport.msg."""
+class ActionOutcome(NamedTuple):
+    """The end of one action; see ActionReport.msg."""
 
     path: str
     server: str
@@ -72,7 +70,7 @@ class ActionOutcome:
 
 @dataclass(frozen=True, slots=True)
 class RunOutcome:
-    """What a RunTree goal is answered with; see RunTree.action."""
+    """The answer to a RunTree goal; see RunTree.action."""
 
     code: int
     message: str = ""
@@ -128,7 +126,7 @@ def outcome_of(
 
 
 def _failure(report: Report) -> tuple[int, list[str]]:
-    """The first action that is to blame, and the chain, it first."""
+    """Return the first action that is to blame, and the chain of failures, first cause first."""
     culprits = report.culprits()
     chain = sorted(culprits, key=lambda each: each.row is None)
     code: int = Code.TREE_FAILED

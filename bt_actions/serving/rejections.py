@@ -10,11 +10,9 @@ from bt_actions.ros.serving.telling import Telling
 from bt_actions.serving.requests import Refused
 from bt_actions.utilities.plain_text import clean
 
-__all__ = ["ECHO", "Rejections"]
-
 REJECTIONS = 10
 ECHO = 200
-"""Characters of a goal's own words in what is said of it."""
+"""Characters of a client's own words in what is said of it."""
 
 
 class Rejections:

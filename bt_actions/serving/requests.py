@@ -15,8 +15,6 @@ from bt_actions.document.yaml.nodes import Mapping as YamlMapping
 from bt_actions.document.yaml.nodes import data_of
 from bt_actions.utilities.plain_text import clean
 
-__all__ = ["MAX_BYTES", "Refused", "inputs_of"]
-
 MAX_BYTES = 256 * 1024
 """Of a goal's `inputs`, in UTF-8."""
 _LONGEST = 1000
@@ -42,7 +40,7 @@ class Said(NamedTuple):
 
 
 def inputs_of(text: str) -> Mapping[str, object]:
-    """The mapping that a text holds, as YAML or JSON; empty for an empty one. Raises Refused."""
+    """Return the mapping that a text holds as YAML or JSON; an empty text is {}. Raises Refused."""
     data = text.encode("utf-8", "surrogatepass")
     if len(data) > MAX_BYTES:
         size = f"{len(data):,} bytes of inputs"
@@ -60,8 +58,7 @@ def inputs_of(text: str) -> Mapping[str, object]:
         refuse_large(values)
     except DocumentError as error:
         first = error.findings[0]
-        place = f"{first.file}:{first.line}:{first.column}"
-        raise Refused(first.code, first.message, place) from None
+        raise Refused(first.code, first.message, str(first.place)) from None
     except (ValueError, RecursionError) as error:
         raise Refused("INPUTS", str(error), "inputs:1:1") from None
     assert isinstance(values, dict)

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
+from bt_actions_interfaces.msg import RunningLeaf
 from py_trees.behaviour import Behaviour
 from py_trees.behaviours import Failure
 from py_trees.common import Status
@@ -24,19 +25,8 @@ from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
 from bt_actions.utilities.places import path_of
 from bt_actions.utilities.plain_text import as_json
 
-__all__ = ["Leaf", "Run"]
-
 SHOWN = 3
 """Running leaves that are told of."""
-
-
-class Leaf(NamedTuple):
-    """A leaf that runs; see RunningLeaf.msg."""
-
-    path: str
-    message: str
-    attempt: int
-    attempts: int
 
 
 class Run:
@@ -80,7 +70,7 @@ class Run:
         self._thread.start()
 
     def end(self, ending: Ending, *, abandon: bool = False) -> None:
-        """End it before its time: its goals are canceled and drained. Returns at once.
+        """End the run before its time: its goals are canceled and drained. Returns at once.
 
         With `abandon`, goals that are being drained are waited for no longer.
         """
@@ -89,15 +79,8 @@ class Run:
             if self._runner is not None:
                 self._runner.interrupt(abandon=abandon)
 
-    def pause(self) -> None:
-        """No new goal begins; those that run finish."""
-        self._pause(True)
-
-    def resume(self) -> None:
-        """Go on."""
-        self._pause(False)
-
-    def _pause(self, wanted: bool) -> None:
+    def pause(self, wanted: bool) -> None:
+        """Begin no new goal, or begin goals again; goals that run go on."""
         with self._lock:
             self.paused = wanted
             self.changes += 1
@@ -105,19 +88,19 @@ class Run:
                 (self._runner.pause if wanted else self._runner.resume)()
 
     def join(self, timeout: float | None = None) -> bool:
-        """Wait until all is over; whether it is."""
+        """Wait until the run is over, for so many seconds; return whether it is."""
         if self._thread.ident is not None:
             self._thread.join(timeout)
         return not self._thread.is_alive()
 
-    def running(self) -> list[Leaf]:
-        """The leaves that run, deepest first; on any thread."""
+    def running(self) -> list[RunningLeaf]:
+        """Return the leaves that run, deepest first; on any thread."""
         paths = [(path_of(leaf), leaf) for leaf in list(self._running)]
         paths.sort(key=lambda each: -len(each[0]))
         return [_leaf(path, leaf) for path, leaf in paths[:SHOWN]]
 
     def retrying(self) -> bool:
-        """Whether an action that runs is not at its first attempt; on any thread."""
+        """Return whether an action that runs is not at its first attempt; on any thread."""
         leaves = list(self._running)
         return any(isinstance(each, ActionBehaviour) and each.attempt > 1 for each in leaves)
 
@@ -181,8 +164,8 @@ class Run:
         self.changes += 1
 
 
-def _leaf(path: tuple[str, ...], leaf: Behaviour) -> Leaf:
-    attempt, attempts = 0, 0
+def _leaf(path: tuple[str, ...], leaf: Behaviour) -> RunningLeaf:
+    told = RunningLeaf(path=SEPARATOR.join(path), message=leaf.feedback_message)
     if isinstance(leaf, ActionBehaviour):
-        attempt, attempts = leaf.attempt, leaf.retry.attempts
-    return Leaf(SEPARATOR.join(path), leaf.feedback_message, attempt, attempts)
+        told.attempt, told.attempts = leaf.attempt, leaf.retry.attempts
+    return told

@@ -40,8 +40,6 @@ from bt_actions.serving.turns import Policy, Turns
 from bt_actions.serving.underway import Underway
 from bt_actions.utilities.plain_text import clean, in_words
 
-__all__ = ["TreeServer"]
-
 RESULT_TIMEOUT = 60
 """Seconds for which an ended goal's result can be asked for; each one kept makes a goal slower."""
 _LAST_WORDS = 2.0
@@ -51,7 +49,7 @@ _LINGER = 0.25
 
 
 class _Admitted(NamedTuple):
-    """What a goal runs that its client has not been told of yet."""
+    """The tree and inputs of a goal that was admitted, before its client knows."""
 
     name: str
     file: str
@@ -170,7 +168,7 @@ class TreeServer:
     def close(self) -> None:
         """Drain, where that has not been done, and be gone.
 
-        Who can, drains, stops the executor, then closes: rclpy's executors fail over what is gone.
+        Best drain, stop the executor, then close: rclpy's executors fail over what is gone.
         """
         if not self._is_drained:
             self.drain()
@@ -328,7 +326,7 @@ class TreeServer:
         return response
 
     async def _off(self, work: Callable[..., Any], *arguments: Any) -> Any:
-        """Do something that takes its time on a thread that is not the executor's."""
+        """Do slow work on the worker's thread, not on the executor's."""
         return await self._endpoints.off(self._worker.submit, lambda: work(*arguments))
 
     # Runs
@@ -355,7 +353,7 @@ class TreeServer:
             self._worker.submit(self._ended, goal, outcome)  # not here: this may be a callback
 
     def _ended(self, goal: Goal, outcome: RunOutcome) -> None:
-        """A run is over: have its goal answered, and let the next one begin."""
+        """Have the goal of a run that is over answered, and the next run begin."""
         seconds = None if goal.begun_at is None else time.monotonic() - goal.begun_at
         self._tell_of(goal, ends(outcome, seconds), "info" if outcome.as_wanted else "error")
         self._last[goal.tree] = outcome

@@ -1,4 +1,4 @@
-"""What is said of one goal, in the words of `bt-actions run`. Pure; no ROS, no state."""
+"""Lines about one goal, in the words of `bt-actions run`. Pure; no ROS, no state."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from bt_actions.serving.requests import Said
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import shorten
 
-__all__ = ["SAME_NAME", "begins", "ends", "warnings_of"]
-
 SAME_NAME = "SAME_NAME"
 _LONG = 60
 """Characters of an input's value,"""
@@ -24,7 +22,7 @@ _STOPPED = tuple(each.value[0] for each in Ending)
 def begins(file: str, tree: Tree, inputs: Mapping[str, object], goal_name: str) -> str:
     """Say what begins: its file, its inputs and the caller's name for it."""
     given = {each.name: each.default for each in tree.inputs.values()} | dict(inputs)
-    words = ", ".join(f"{name}={_brief(value)}" for name, value in given.items())
+    words = ", ".join(f"{name}={shorten(value, _LONG)}" for name, value in given.items())
     if len(words) > _LONGEST:
         words = f"{words[: _LONGEST - 1]}…"
     called = f", called {goal_name!r}" if goal_name else ""
@@ -43,12 +41,8 @@ def ends(outcome: RunOutcome, seconds: float | None) -> str:
 
 
 def warnings_of(entry: Entry) -> list[Said]:
-    """What is wrong with the name of a tree: other files have it as well."""
+    """Return what is wrong with the name of a tree: other files have the same name."""
     return [
         Said(SAME_NAME, f"{entry.file} is served as {entry.name!r}, and {each} is not", str(each))
         for each in entry.hides
     ]
-
-
-def _brief(value: object) -> str:
-    return shorten(value, _LONG)

@@ -1,6 +1,6 @@
-"""Whose turn it is: which goals run, which wait, and which are refused. Pure; no ROS, no thread.
+"""The goals that run, wait, and are refused. Pure; no ROS, no thread.
 
-Whoever uses it holds a lock around each call.
+The caller holds a lock around each call.
 """
 
 from __future__ import annotations
@@ -9,21 +9,19 @@ import enum
 from collections import deque
 from typing import Generic, TypeVar
 
-__all__ = ["Policy", "Turns"]
-
 T = TypeVar("T")
 
 
 class Policy(enum.StrEnum):
-    """What to do with a goal that comes while another runs."""
+    """The ways to treat a goal that comes while another runs."""
 
     REJECT = "reject"
     QUEUE = "queue"
-    """It waits; at most `most` do."""
+    """The newer goal waits; at most `most` do."""
     REPLACE = "replace"
     """The older one is halted, and the newer begins when all goals of the older have ended."""
     PARALLEL = "parallel"
-    """They run beside each other, at most `most`."""
+    """The goals run beside each other, at most `most`."""
 
 
 class Turns(Generic[T]):
@@ -39,7 +37,7 @@ class Turns(Generic[T]):
         self.waiting: deque[T] = deque()
 
     def refusal(self) -> str:
-        """Why one more goal cannot be admitted at this moment; or ""."""
+        """Return why no more goal can be admitted at this moment; or ""."""
         there = len(self.running) + len(self.waiting) + self.expected
         if self.policy is Policy.REJECT and there:
             return "another tree runs here"
@@ -50,9 +48,9 @@ class Turns(Generic[T]):
         return ""
 
     def come(self, goal: T) -> tuple[list[T], list[T]]:
-        """A goal that was admitted is here. Return who is to begin now, and who is to be halted.
+        """Take a goal that was admitted. Return the goals to begin, and the goals to halt.
 
-        Who is halted still has to `leave`, also where it was only waiting.
+        A goal that is halted still has to `leave`, also one that only waited.
         """
         self.expected = max(0, self.expected - 1)
         self.waiting.append(goal)
@@ -62,7 +60,7 @@ class Turns(Generic[T]):
         return self._next(), halted
 
     def leave(self, goal: T) -> list[T]:
-        """A goal has ended, wherever it was. Return who is to begin now."""
+        """Take note that a goal has ended, waiting or not. Return the goals to begin."""
         if goal in self.running:
             self.running.remove(goal)
         elif goal in self.waiting:

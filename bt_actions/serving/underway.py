@@ -1,4 +1,4 @@
-"""Which actions the trees of a server use at this moment, on record should it be killed. No ROS.
+"""The actions that a server's trees use at this moment, on record should it be killed. No ROS.
 
 A server that is started again cleans up there, before it accepts goals. Beside the ledger, in
 memory; a server that ends in good order leaves no file, but for goals whose end it does not know.
@@ -18,8 +18,6 @@ from bt_actions.recovery.ledger import directory
 from bt_actions.ros.log import log
 from bt_actions.utilities.whole_file import replace_file
 
-__all__ = ["Underway", "left_underway"]
-
 _SUFFIX = ".underway"
 _PREFIX = 12
 """Bytes that all goal ids of a process begin with."""
@@ -37,14 +35,14 @@ class Underway:
         self._name = f"{new_goal_id()[:_PREFIX].hex()}-{next(_number)}{_SUFFIX}"
 
     def begins(self, run: object, actions: Collection[str]) -> None:
-        """A run is about to use these actions, which are full names."""
+        """Put on record that a run is about to use these actions, by their full names."""
         if actions:
             with self._lock:
                 self._runs[run] = actions
                 self._write()
 
     def ends(self, run: object) -> None:
-        """All that a run began has ended."""
+        """Take off the record a run whose goals have all ended."""
         with self._lock:
             if self._runs.pop(run, None) is not None:
                 self._write()
@@ -63,7 +61,7 @@ class Underway:
 
 
 def left_underway(domain: int) -> Iterable[tuple[Path, list[str]]]:
-    """The records of killed servers of this machine, in a ROS domain. Raises OSError."""
+    """Return the records of killed servers of this machine, in a ROS domain. Raises OSError."""
     for path in sorted(directory().glob(f"*{_SUFFIX}")):
         author = None
         with contextlib.suppress(ValueError):

@@ -60,7 +60,6 @@ class LiveGoal:
         return f"<LiveGoal {self.goal_id[:8]} {self.run!r}>"
 
     def step(self, now: float) -> bool:
-        """Move for one step of simulated time; return whether it still moves."""
         try:
             happened = self.run.step(now, self._step_period)
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its motion does

@@ -164,15 +164,12 @@ class SimulatedServer(GoalMeaning):
                 self.record("", Event.CLOSED, reason=reason)
 
     def record(self, goal_id: str, event: Event, **more: object) -> None:
-        """Write a line into the journal."""
         self.journal.write(self.name, goal_id, event, **more)
 
     def broken(self, goal_id: str, reason: str) -> None:
-        """Write into the log why a goal is aborted for which its script, or subclass, raised."""
         self._log.warning(f"{self.name}: goal {goal_id[:8]} aborted: {reason}")
 
     def ended(self, goal: LiveGoal, result: Any) -> None:
-        """Send the result of a goal that has reached its terminal state."""
         self.stepper.stop(goal)
         self._live.pop(goal.goal_id, None)
         if self._wire is not None:
@@ -182,7 +179,6 @@ class SimulatedServer(GoalMeaning):
     # Requests, as the wire brings them.
 
     def on_request(self, request: Request) -> bool:
-        """Return whether to answer a request now."""
         with self.stepper.lock:
             if request.kind == "goal":
                 return self._on_goal_request(request)
@@ -191,7 +187,6 @@ class SimulatedServer(GoalMeaning):
             return self._results.on_request(request.goal_id, request)
 
     def on_answered(self, request: Request) -> None:
-        """Go on after an answer was sent."""
         with self.stepper.lock:
             if request.kind == "goal":
                 not_started = self._intake.answered(request.goal, request.goal_id)
@@ -234,12 +229,10 @@ class SimulatedServer(GoalMeaning):
             self._wire.answer_soon(request)
 
     def decide(self, goal: Any) -> bool:
-        """Return whether to accept a goal."""
         with self.stepper.lock:
             return self._intake.decide(goal, self.refusal)
 
     def start(self, goal_id: str, goal: Any) -> None:
-        """Begin a goal that was accepted."""
         with self.stepper.lock:
             # The journal has it accepted before an older goal is aborted, so that a client which
             # has two goals at once is seen.
@@ -270,7 +263,6 @@ class SimulatedServer(GoalMeaning):
             return _Nowhere(), f"it could not begin: {raised(error)}"
 
     def cancel(self, goal_id: str) -> bool:
-        """Return whether to cancel a goal."""
         with self.stepper.lock:
             live = self._live.get(goal_id)
             return live is not None and live.cancel(self.stepper.now())

@@ -55,43 +55,35 @@ class VirtualActionServer:
         medium.add_server(self)
 
     def receive(self, request: VirtualRequest) -> None:
-        """Take a request, as the network brings it."""
         if not self._gone and self._server.on_request(request):
             self._answer(request)
 
     @property
     def statuses(self) -> dict[bytes, int]:
-        """The status of each goal that is not forgotten."""
         return {bytes.fromhex(goal_id): goal.status for goal_id, goal in self._goals.items()}
 
     # For the server
 
     def answer_soon(self, request: Request, *, silent: bool = False) -> None:
-        """Answer a request that was kept."""
         self._medium.timeline.call_in(0.0, lambda: self._answer(request, silent=silent))
 
     def knows(self, goal_id: str) -> bool:
-        """Whether this goal was accepted and is not forgotten yet."""
         return goal_id in self._goals
 
     def start(self, goal_id: str) -> None:
-        """Set an accepted goal to EXECUTING."""
         self._set(goal_id, STATUS_EXECUTING)
 
     def feedback(self, goal_id: str, message: Any) -> None:
-        """Publish feedback."""
         if not isinstance(message, self.action_type.Feedback):
             raise TypeError(f"{message!r} is no {short_name(self.action_type.Feedback)}")
         self._medium.publish_feedback(self, bytes.fromhex(goal_id), message)
 
     def end(self, goal_id: str, status: int) -> int:
-        """Set a goal to a terminal status, unless it has one."""
         if self._goals[goal_id].status < STATUS_SUCCEEDED:
             self._set(goal_id, status)
         return self._goals[goal_id].status
 
     def finish(self, goal_id: str, result: Any) -> None:
-        """Send the result to all who have asked for it, and keep it for those who will."""
         goal = self._goals[goal_id]
         goal.result = result
         for request in goal.asked:
@@ -100,7 +92,6 @@ class VirtualActionServer:
         self._medium.timeline.call_in(self._result_timeout, lambda: self._forget(goal_id))
 
     def destroy(self) -> None:
-        """Go, at once and without a word to the clients."""
         self._gone = True
         self._goals.clear()
         self._medium.remove_server(self)

@@ -43,21 +43,17 @@ class VirtualBackend:
         return int(self.network.now() * 1e9)
 
     def service(self, service_type: type, name: str) -> VirtualService:
-        """Become a client of a service."""
         return VirtualService(self.network, service_type, name)
 
     def subscription(
         self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]
     ) -> VirtualSubscription:
-        """Listen to a topic."""
         return VirtualSubscription(self.network, message_type, topic, qos, take)
 
     def publisher(self, message_type: type, topic: str, qos: str) -> VirtualSpeaker:
-        """Become a publisher on a topic."""
         return VirtualSpeaker(self.network, message_type, topic, qos)
 
     def log(self, level: str, text: str) -> None:
-        """Write a line of the tree's to the network's log."""
         self.network.log.add(level, text)
 
 
@@ -97,7 +93,6 @@ class VirtualService(_Connection):
 
     @property
     def ready(self) -> bool:
-        """Whether the service is there."""
         return self._network.service(self._type, self.name) is not None
 
     def call(self, request: Any) -> Future[Any]:
@@ -152,12 +147,10 @@ class VirtualSubscription(_Connection):
         self._mine = network.subscribe(message_type, topic, take, latched=qos == "latched")
 
     def may_come(self) -> float:
-        """Seconds for which the first message of who publishes may be on its way."""
         left = self._given_until - self._network.now()
         return max(0.0, left) if self._type in self._topic.published else 0.0
 
     def close(self) -> None:
-        """Unsubscribe."""
         if self._mine in self._topic.subscriptions:
             self._topic.subscriptions.remove(self._mine)
 
@@ -180,7 +173,6 @@ class VirtualSpeaker(_Connection):
 
     @property
     def listeners(self) -> int:
-        """How many subscriptions get what is published."""
         return self._publisher.listeners
 
     def _there(self) -> dict[str, set[type]]:

@@ -37,15 +37,12 @@ class VirtualHost:
         self._runs = False
 
     def domain(self, number: int) -> Domain:
-        """Return what is shared in the ROS domain of this number."""
         return self._domains.setdefault(number, Domain())
 
     def steady(self) -> float:
-        """Return the virtual time."""
         return self._timeline.now
 
     def new_goal_id(self) -> bytes:
-        """Return the next 16 bytes of the seed."""
         return self.randomness.randbytes(16)
 
     def wait(self, timeout: float) -> bool:

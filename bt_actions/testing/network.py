@@ -33,15 +33,12 @@ class Lines:
         self.lines.append((level, text))
 
     def info(self, text: str) -> None:
-        """Log at info level."""
         self.add("info", text)
 
     def warning(self, text: str) -> None:
-        """Log at warning level."""
         self.add("warning", text)
 
     def error(self, text: str) -> None:
-        """Log at error level."""
         self.add("error", text)
 
     def flush(self) -> None:
@@ -75,17 +72,14 @@ class VirtualNetwork(Medium):
         return self.timeline.now
 
     def timer(self, ring: Callable[[], None]) -> VirtualTimer:
-        """Make a timer."""
         return VirtualTimer(self.timeline, ring)
 
     def expand(self, name: str) -> str:
-        """Return a name in the namespace of the network."""
         return name if name.startswith("/") else f"{self.namespace.rstrip('/')}/{name}"
 
     def serve(
         self, action_type: Any, name: str, server: Server, result_timeout: float
     ) -> VirtualActionServer:
-        """Serve an action."""
         return VirtualActionServer(self, self.expand(name), action_type, server, result_timeout)
 
     def publisher(
@@ -198,7 +192,6 @@ class VirtualPublisher:
 
     @property
     def listeners(self) -> int:
-        """How many subscriptions get what is published."""
         subscriptions = self._network.topic(self.topic).subscriptions
         return sum(each is self.message_type for each, _ in subscriptions)
 
@@ -219,7 +212,6 @@ class VirtualPublisher:
                 self._network.soon(its.bring, subscription, message)
 
     def destroy(self) -> None:
-        """Publish no more."""
         its = self._network.topic(self.topic)
         if self in its.publishers:
             its.publishers.remove(self)
@@ -239,13 +231,11 @@ class VirtualTimer:
         return self._alarm is None
 
     def set(self, when: float | None) -> None:
-        """Ring at `when`; None: not at all."""
         self.destroy()
         if when is not None:
             self._alarm = self._timeline.call_at(when, self._rings)
 
     def destroy(self) -> None:
-        """Ring no more."""
         if self._alarm is not None:
             self._alarm.cancel()
             self._alarm = None

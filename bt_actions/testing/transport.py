@@ -56,21 +56,17 @@ class VirtualTransport:
     # Requests
 
     def send(self, goal_id: bytes, goal: Any) -> None:
-        """Send the goal request."""
         self.reachability.asked(self._now)
         self._ask("goal", goal_id, goal)
 
     def ask_result(self, goal_id: bytes) -> None:
-        """Ask for the result."""
         self._ask("result", goal_id)
 
     def cancel(self, goal_id: bytes) -> None:
-        """Ask to cancel this goal."""
         self.reachability.asked(self._now)
         self._ask("cancel", goal_id)
 
     def forget(self, goal_id: bytes) -> None:
-        """Tell no more answers, but for further acceptances of the newest goals."""
         about = [question for question in self._questions if question.goal_id == goal_id]
         for question in about:
             del self._questions[question]
@@ -108,13 +104,11 @@ class VirtualTransport:
         tell.all_delivered()
 
     def hear_feedback(self, goal_id: bytes, feedback: Any) -> None:
-        """Take feedback, as the network brings it."""
         if not (self.closed or self.on_trial):
             self._listener.feedback_came(goal_id, feedback)
             self._listener.all_delivered()
 
     def hear_status(self, statuses: dict[bytes, int]) -> None:
-        """Take a status message, as the network brings it."""
         if not self.closed:
             self._listener.statuses_came(statuses)
             self._listener.all_delivered()
@@ -125,21 +119,17 @@ class VirtualTransport:
         return self._medium.servers_of(self)
 
     def servers(self) -> frozenset[GID]:
-        """Return who is shown to take goal requests."""
         if not self._participant.alive():
             raise RuntimeError("this participant is gone")
         return frozenset(server.gid for server in self._shown())
 
     def count(self) -> int:
-        """Count them."""
         return len(self.servers())
 
     def ready(self) -> bool:
-        """Whether a server is shown."""
         return bool(self.servers())
 
     def close(self) -> None:
-        """Send and deliver nothing any more."""
         if not self.closed:
             self.closed = True
             self._medium.remove_client(self)
@@ -159,11 +149,9 @@ class VirtualParticipant:
         self._alive = True
 
     def now(self) -> Now:
-        """Return this moment; both clocks are one."""
         return Now(self.medium.timeline.now, self.medium.timeline.now)
 
     def alive(self) -> bool:
-        """Whether it was not closed."""
         return self._alive
 
     def close(self) -> None:
@@ -171,22 +159,18 @@ class VirtualParticipant:
         self._alive = False
 
     def shut_down(self) -> bool:
-        """It never is."""
         return False
 
     def full_name(self, action: str) -> str:
-        """Return the full name of an action."""
         if action.startswith("/"):
             return action
         own = f"{self.name}{action[1:]}" if action.startswith("~") else action
         return f"{self.namespace.rstrip('/')}/{own}"
 
     def open_transport(self, action_type: Any, name: str, listener: Listener) -> VirtualTransport:
-        """Open a transport."""
         return VirtualTransport(self, action_type, name, listener)
 
     def instead(self, action_type: Any, name: str) -> str:
-        """Say what is there where the action is not."""
         served = {each: interface_name(kind) for each, kind in self.medium.actions.items()}
         ours = interface_name(action_type)
         if name in served:

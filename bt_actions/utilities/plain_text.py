@@ -9,8 +9,6 @@ import json
 import math
 import re
 
-__all__ = ["as_json", "clean", "clean_lines", "in_words", "raised"]
-
 _NONE = "\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff"
 """Controls, those that turn the direction of what follows, and characters that are none."""
 _STRANGE = re.compile(f"[\x00-\x08\x0b-\x1f{_NONE}]")

@@ -9,8 +9,6 @@ from collections.abc import Iterator, Mapping
 
 from bt_actions.utilities.plain_data import field_of, item_of, scalar
 
-__all__ = ["given_fields", "shorten", "shorten_fields"]
-
 _ALL = 20
 """A list with more items is shown by its first ones and their number."""
 _FIRST = 3

@@ -9,8 +9,6 @@ from __future__ import annotations
 import os
 import sys
 
-__all__ = ["open_closed_streams"]
-
 
 def open_closed_streams() -> None:
     """Open the null device in place of each standard stream that is closed."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Collection, Iterable, Mapping
 
-__all__ = ["closest", "did_you_mean", "elsewhere", "folded", "listing", "what_it_has"]
-
 _LONGEST = 60
 _MOST = 60
 _BEGINNING = 4

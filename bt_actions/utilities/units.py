@@ -7,9 +7,6 @@ import re
 
 from bt_actions.utilities.shorten import shorten
 
-__all__ = ["DURATION_UNITS", "TURN", "parse_angle", "parse_duration", "parse_seconds",
-           "spoken_duration"]  # fmt: skip
-
 DURATION_UNITS = {
     "ns": 1e-9,
     "us": 1e-6,

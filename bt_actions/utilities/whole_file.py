@@ -8,8 +8,6 @@ import secrets
 import stat
 from pathlib import Path
 
-__all__ = ["replace_file"]
-
 
 def replace_file(path: Path, data: bytes) -> None:
     """Write what a file shall hold from now on: all of it, or no change. Raises OSError.

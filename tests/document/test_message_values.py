@@ -9,7 +9,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.document import check_source, source_of
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from tests.document.conftest import tick
 
 Load = Callable[..., Behaviour]
@@ -142,7 +143,7 @@ def test_a_constant_that_is_not_there_has_no_value() -> None:
         raise ValueError(f"no {name}")
 
     expression = Expression("A.B == 1", roots=(), constants=none_there)
-    assert expression.constants == ["A.B"]
+    assert expression.form.constants == ["A.B"]
     with pytest.raises(ExpressionError, match=r"no A\.B"):
         expression.evaluate({}, lambda name: name)
 

@@ -11,8 +11,8 @@ from bt_actions.packages import PackageError, environment
 from bt_actions.packages.environment import (
     build_environment,
     check_compilers,
-    here,
     installer,
+    own_prefix,
     pins,
 )
 
@@ -87,4 +87,4 @@ def test_where_ros_is_no_wheel_colcon_is_named(
 ) -> None:
     monkeypatch.setattr("sysconfig.get_path", lambda _: str(tmp_path))
     with pytest.raises(PackageError, match=r"`colcon build`.*docs/workspace\.md"):
-        here()
+        own_prefix()

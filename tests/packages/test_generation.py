@@ -10,7 +10,7 @@ import pytest
 from bt_actions.packages import PackageError
 from bt_actions.packages.environment import Tools
 from bt_actions.packages.generation import generate
-from bt_actions.packages.sources import read_source
+from bt_actions.packages.sources import read_package
 from tests.packages.conftest import Write
 
 pytest.importorskip("rosidl_adapter")
@@ -25,7 +25,7 @@ def failed(write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, **tool
     for name, script in tools.items():
         (commands / name).write_text(f"#!/bin/sh\n{script}\n")
         (commands / name).chmod(0o755)
-    source = read_source(write("my_msgs", {"msg/A.msg": "int32 a\n"}))
+    source = read_package(write("my_msgs", {"msg/A.msg": "int32 a\n"}))
     with pytest.raises(PackageError) as raised:
         generate(source, [], Tools(Path(sys.executable), commands.parent), tmp_path / "work", print)
     return str(raised.value)

@@ -8,7 +8,7 @@ import pytest
 
 from bt_actions.packages import PackageError
 from bt_actions.packages.installing import check_names, left_behind
-from bt_actions.packages.sources import Source, read_source
+from bt_actions.packages.sources import Package, read_package
 from bt_actions.packages.wheel import GENERATOR
 from tests.packages.conftest import Write
 
@@ -36,11 +36,11 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return site
 
 
-def source(write: Write, name: str, version: str = "1.0.0") -> Source:
-    return read_source(write(name, {"msg/A.msg": "int32 a\n"}, version=version))
+def source(write: Write, name: str, version: str = "1.0.0") -> Package:
+    return read_package(write(name, {"msg/A.msg": "int32 a\n"}, version=version))
 
 
-def refused(source: Source) -> str:
+def refused(source: Package) -> str:
     with pytest.raises(PackageError) as raised:
         check_names([source])
     return str(raised.value).removeprefix(f"{source.folder}: ")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bt_actions.packages import PackageError
-from bt_actions.packages.sources import read_source
+from bt_actions.packages.sources import read_package
 from tests.packages.conftest import Write
 
 pytest.importorskip("rosidl_adapter")
@@ -17,14 +17,14 @@ ACTION = "int32 a\n---\n---\n"
 
 def refused(folder: Path) -> str:
     with pytest.raises(PackageError) as raised:
-        read_source(folder)
+        read_package(folder)
     text = str(raised.value)
     assert len(text.splitlines()) == 1
     return text.replace(f"{folder}/", "").replace(str(folder), "FOLDER")
 
 
 def test_a_package_is_what_its_files_say(write: Write) -> None:
-    source = read_source(
+    source = read_package(
         write(
             "my_msgs",
             {
@@ -55,7 +55,7 @@ def test_the_files_are_those_that_cmake_names_or_all(
     cmake: str, files: tuple[str, ...], write: Write
 ) -> None:
     both = {"msg/A.msg": "int32 a\n", "msg/B.msg": "int32 b\n", "msg/README.md": ""}
-    assert read_source(write("my_msgs", both, cmake=cmake)).files == files
+    assert read_package(write("my_msgs", both, cmake=cmake)).files == files
 
 
 @pytest.mark.parametrize(
@@ -91,7 +91,7 @@ def test_a_message_that_holds_itself_is_refused(write: Write) -> None:
 
 
 def test_a_name_may_be_in_the_goal_and_in_the_result(write: Write) -> None:
-    read_source(write("my_msgs", {"action/Do.action": "int32 a\n---\nint32 a\n---\nint32 a\n"}))
+    read_package(write("my_msgs", {"action/Do.action": "int32 a\n---\nint32 a\n---\nint32 a\n"}))
 
 
 def test_what_is_no_interface_package_is_refused(write: Write, tmp_path: Path) -> None:

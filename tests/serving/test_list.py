@@ -11,7 +11,7 @@ from rclpy.node import Node
 
 from bt_actions.cli.commands.list_trees import text_of, tree_data
 from bt_actions.ros.serving.endpoints import Endpoints
-from bt_actions.serving.asking import trees_in_sight
+from bt_actions.serving.client import trees_in_sight
 from tests.serving.conftest import MAIN, Serve
 from tests.support.processes import Process
 

@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     no_parameters(args.ros_args, "control", "bt_actions_asks")
     server = args.server if args.server.startswith("/") else f"{args.namespace}/{args.server}"
     with importing_ros():
-        from bt_actions.serving.asking import NotControlled, control
+        from bt_actions.serving.client import NotControlled, control
     try:
         with starting_ros():
             which = control(server, args.wish, beginning)

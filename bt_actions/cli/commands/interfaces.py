@@ -103,12 +103,12 @@ def run(args: argparse.Namespace) -> int:
         except (PackageError, OSError) as error:  # a folder that cannot be written, a full disk
             raise BadInput(f"interfaces build: {error}") from error
         return Exit.SUCCESS
-    from bt_actions.messages.interfaces import UnknownInterface
-    from bt_actions.packages.definition import all_interfaces, definition, full_name
+    from bt_actions.messages.definition import all_interfaces, definition
+    from bt_actions.messages.interfaces import UnknownInterface, full_name
 
     if args.action == "show":
         try:
-            name = full_name(args.type)
+            name = full_name(args.type, all_interfaces(), "type")
             lines = list(definition(name, all_comments=args.all_comments))
         except UnknownInterface as error:
             raise BadInput(str(error)) from error
@@ -126,20 +126,20 @@ def run(args: argparse.Namespace) -> int:
 def _build(args: argparse.Namespace) -> None:
     from bt_actions.packages import installing
     from bt_actions.packages.building import build_wheels
-    from bt_actions.packages.environment import build_environment, check_compilers, here
+    from bt_actions.packages.environment import build_environment, check_compilers, own_prefix
     from bt_actions.packages.order import in_order
 
     began = time.monotonic()
     if args.output is not None:
         args.output.mkdir(parents=True, exist_ok=True)
-    sources = in_order(args.paths, [here()])
+    sources = in_order(args.paths, [own_prefix()])
     if args.output is None:
         installing.check_names(sources)
     check_compilers()
     tools = build_environment(note, network=args.network)
     note(f"building {', '.join(map(str, sources))}")
     with tempfile.TemporaryDirectory(prefix="bt_actions-wheels-") as kept, _progress() as show:
-        wheels = build_wheels(sources, tools, [here()], args.output or Path(kept), show)
+        wheels = build_wheels(sources, tools, [own_prefix()], args.output or Path(kept), show)
         if args.output is None:
             show("installing", "")
             installing.install(wheels)

@@ -45,7 +45,7 @@ def run(args: argparse.Namespace) -> int:
     no_parameters(args.ros_args, "list", "bt_actions_asks")
     keep_results_apart()
     with importing_ros():
-        from bt_actions.serving.asking import trees_in_sight
+        from bt_actions.serving.client import trees_in_sight
     with starting_ros():
         found = trees_in_sight(args.namespace)
     trees = {

@@ -36,7 +36,7 @@ class Rejected:
 
     @cached_property
     def _why(self) -> tuple[str, str] | None:
-        from bt_actions.serving.asking import why_rejected
+        from bt_actions.serving.client import why_rejected
 
         why = why_rejected(self._goal_name)
         return None if why is None else (clean(why.code), clean(why.message))

@@ -45,8 +45,6 @@ from bt_actions.goals.policy import Busy, Retry, Timeouts
 from bt_actions.messages.interfaces import interface
 from bt_actions.utilities.shorten import shorten
 
-__all__ = ["BUILDERS", "build"]
-
 
 def build(
     document: Document,
@@ -106,7 +104,7 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
     behaviour = BUILDERS[node.kind.name](node, context)
     if context.topics and not isinstance(behaviour, WaitUntil):  # which waits anyway
         written = settings_of(node, context.document) if node.is_action else node.values
-        names = {name for each in computed_in(written) for name in each.expression.names}
+        names = {name for each in computed_in(written) for name in each.expression.variables}
         if read := [topic for name, topic in context.topics.items() if name in names]:
             patient(behaviour, read)
     setattr(behaviour, NODE, node)

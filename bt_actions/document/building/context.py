@@ -29,8 +29,6 @@ from bt_actions.document.yaml.nodes import Scalar
 from bt_actions.expressions.expression import Expression
 from bt_actions.messages import fields
 
-__all__ = ["Context", "Scope", "plain_name", "table_of", "written_text"]
-
 _NUMBERS = {*fields.FLOATS, *fields.INTEGERS} - {"byte"}
 _ODD = re.compile(r"[^A-Za-z0-9_]")
 _LOADS = "/bt/loads"

@@ -29,8 +29,6 @@ from bt_actions.document.yaml.source import Source
 from bt_actions.messages.conversion import Problem, examine
 from bt_actions.messages.fields import FieldType, Message
 
-__all__ = ["check_document"]
-
 
 def check_document(checker: Checker) -> None:
     """Report everything that is wrong with names and types to the documents' own sources."""

@@ -50,7 +50,8 @@ from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.mistaken import warn_bare_angle, warn_bare_duration
 from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.messages.conversion import ANGLE, examine
 from bt_actions.messages.fields import FieldType, Listing, Message, describe
 from bt_actions.messages.interfaces import DURATION, RUN_TREE, interface_name
@@ -58,9 +59,6 @@ from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:
     from bt_actions.document.language.classes import Python
-
-__all__ = ["Checker"]
-
 
 Types = MappingType[str, FieldType | None]
 
@@ -174,7 +172,6 @@ class Checker:
         infer_variables(writers, self.variables, self._type_of)
 
     def action_class(self, declared: Declared) -> type | None:
-        """The class of the action that a name stands for."""
         name = declared.name
         if name not in self._classes:
             text, at = declared.values.get("type"), declared.written("type")
@@ -318,7 +315,7 @@ class Checker:
             if may_need_more and isinstance(item, (int, float)):
                 at = locate(node, path)
                 if isinstance(at, Scalar) and at.value == item:  # else it comes from a file
-                    return self._bare_number(at, item, wanted)
+                    return self._needs_unit_or_quotes(at, item, wanted)
             return item is BAD
 
         for problem in examine(kind, value, hole):
@@ -330,7 +327,7 @@ class Checker:
             meant = None if problem.at_key else marked_here(at, self.source, known)
             self.source.report(code, span_of(at), text, hint=_trap(at) or meant)
 
-    def _bare_number(self, at: Scalar, number: float, wanted: FieldType) -> bool:
+    def _needs_unit_or_quotes(self, at: Scalar, number: float, wanted: FieldType) -> bool:
         """Warn of a number that is likely to need a unit; report one in the place of a text."""
         if wanted == TEXT:
             self.source.report(
@@ -387,7 +384,6 @@ class Checker:
     def infer(
         self, expression: Expression, roots: Types, reader: object
     ) -> tuple[FieldType | None, list[Wrong]]:
-        """The type of an expression, and what is wrong with it."""
         variable = self._types_at(reader) if self._items else self.variables.get
         kinds = map(variable, expression.variables)
         noted = _noted(expression.form, self.types, *roots.values(), *kinds)

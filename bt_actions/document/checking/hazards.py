@@ -24,8 +24,6 @@ from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
 from bt_actions.document.yaml.nodes import span_of
 
-__all__ = ["find_hazards"]
-
 _BUSY = BEGUN | {"wait_until", "running", "python", "retry", "repeat", "for_each"}
 _LOOPED = ("as", "index")
 """What a loop writes for those who want to read it."""

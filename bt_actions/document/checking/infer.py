@@ -41,8 +41,6 @@ from bt_actions.messages.fields import (
 from bt_actions.messages.interfaces import UnknownInterface, interface_name
 from bt_actions.utilities.suggest import what_it_has
 
-__all__ = ["Wrong", "infer"]
-
 Wrong = tuple[str, str, int, int]
 """A rule's code, a message, and the columns in the expression's text."""
 _RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {

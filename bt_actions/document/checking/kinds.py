@@ -18,8 +18,6 @@ from bt_actions.document.yaml.nodes import Node, span_of
 from bt_actions.messages.fields import FieldType, Listing, Scalar
 from bt_actions.utilities.suggest import did_you_mean, listing
 
-__all__ = ["CHECKS"]
-
 
 def _subtree(checker: Checker, node: TreeNode) -> None:
     included = node.included

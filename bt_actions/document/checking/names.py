@@ -25,8 +25,6 @@ from bt_actions.document.reading.tree import (
 from bt_actions.document.yaml.nodes import Node, span_of
 from bt_actions.messages.interfaces import RUN_TREE
 
-__all__ = ["check_names"]
-
 _WORDS = {"action": "the action server", "srv": "the service", "msg": "the topic"}
 _TOPIC = Interface("msg", "topic")
 _MOST = 10_000

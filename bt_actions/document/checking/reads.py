@@ -25,8 +25,6 @@ from bt_actions.document.language.values import Computed, computed_in
 from bt_actions.document.reading.tree import TreeNode, settings_of
 from bt_actions.document.yaml.nodes import span_of
 
-__all__ = ["find_early_reads", "find_missing"]
-
 _NOTHING: frozenset[str] = frozenset()
 _LOOPS = frozenset({"retry", "repeat", "for_each", "while", "parallel"})
 _STRAIGHT = frozenset({"sequence", "timeout", "while", "run_once"})
@@ -248,7 +246,7 @@ class _Missing:
         there = {*self._checker.written_by(node), *(need.name for need in needs)}
         kind = node.kind.name
         if kind in ("check", "wait_until"):
-            there.update(*(one.expression.names for one in computed_in(node.values.get(kind))))
+            there.update(*(one.expression.variables for one in computed_in(node.values.get(kind))))
         inner = [self._needs(child) for child in node.children]
         if kind == "fallback" and inner:
             in_all = [{need.name for need in each} for each, _ in inner]

@@ -13,8 +13,6 @@ from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_
 from bt_actions.document.yaml.source import Source
 from bt_actions.document.yaml.written import inner_span
 
-__all__ = ["marked_here", "warn_unmarked"]
-
 _PATH = r"([A-Za-z]\w*(?:\.\w+)*)"
 _FORMS = re.compile(
     rf"(?<!\$)\{{+\s*{_PATH}\s*(?::[^{{}}]*)?\}}+|%\({_PATH}\)[a-z]?|<{_PATH}>|(?<!\w)@{_PATH}",

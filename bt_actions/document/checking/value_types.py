@@ -9,12 +9,6 @@ from bt_actions.document.reading.tree import Write
 from bt_actions.expressions.functions import KNOWN
 from bt_actions.messages.fields import FLOATS, INTEGERS, FieldType, Listing, Scalar
 
-__all__ = [
-    "BOOL", "FLOAT", "INTEGER", "ONE_VALUE", "TEXT", "common_type", "comparable", "has_length",
-    "infer_variables", "is_float", "is_number", "is_text", "items_inside", "joined", "named",
-    "type_of_literal", "unjoinable",
-]  # fmt: skip
-
 _ROUNDS = 8
 """How far a type is followed from variable to variable, before none is taken for known."""
 _NUMBERS = frozenset({*INTEGERS, *FLOATS})

@@ -8,8 +8,6 @@ from typing import NamedTuple
 from bt_actions.document.language.values import computed_in
 from bt_actions.document.reading.tree import Document, TreeNode, settings_of
 
-__all__ = ["BEGUN", "Can", "Verdicts"]
-
 
 class Can(NamedTuple):
     """Whether a node can succeed, and whether it can fail."""

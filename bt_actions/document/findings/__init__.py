@@ -16,8 +16,6 @@ LOADED = "_bt_actions_loaded"
 """The attribute of a behaviour that has the node it was made from, and that of a loaded root which
 has its document. Not such as a user's own class may have."""
 
-__all__ = ["LOADED", "NODE", "DocumentError", "Finding", "Place", "Related", "Severity", "Span"]
-
 
 class Place(NamedTuple):
     """A position in a file; line and column count from 1."""
@@ -72,6 +70,7 @@ class Finding:
 
     @property
     def place(self) -> Place:
+        """File, line and column."""
         return Place(self.file, self.line, self.column)
 
     def headline(self) -> str:

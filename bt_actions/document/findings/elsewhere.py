@@ -12,8 +12,6 @@ from collections.abc import Mapping as MappingType
 
 from bt_actions.utilities.suggest import folded
 
-__all__ = ["as_mapping", "key_here", "kind_here", "notation_here", "package_here", "type_here"]
-
 
 def _table(rows: MappingType[str, str]) -> dict[str, str]:
     """What is written here, by each of the words that stand behind it."""

@@ -7,8 +7,6 @@ from functools import partial
 from bt_actions.document.findings import Severity
 from bt_actions.document.findings.rule import SUCCESS, Rule, moving, tree
 
-__all__ = ["HAZARDS"]
-
 _warning = partial(Rule, severity=Severity.WARNING)
 HAZARDS = (
     _warning("BT301", "no result timeout",

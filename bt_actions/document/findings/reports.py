@@ -16,8 +16,6 @@ from urllib.parse import quote
 from bt_actions.document.findings import Finding, Severity
 from bt_actions.document.findings.rules import RULES
 
-__all__ = ["REPORTS", "as_github", "as_json", "as_sarif", "as_text"]
-
 
 def as_text(findings: Sequence[Finding], width: int = 200) -> str:
     """As a compiler prints them, errors first, with a count at the end; source lines are cut to

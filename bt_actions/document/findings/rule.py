@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from bt_actions.document.findings import Severity
 
-__all__ = ["MOVE", "SUCCESS", "Rule", "moving", "tree"]
-
 
 @dataclass(frozen=True, slots=True)
 class Rule:

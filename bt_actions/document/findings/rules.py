@@ -12,8 +12,6 @@ from bt_actions.document.findings import Severity
 from bt_actions.document.findings.hazards import HAZARDS
 from bt_actions.document.findings.rule import MOVE, SUCCESS, Rule, moving, tree
 
-__all__ = ["RULES", "Rule"]
-
 _CAFE = r"printf 'tree: t\nroot: {success: Caf\351}\n' "
 _RULES = (
     Rule("BT100", "the file cannot be read",

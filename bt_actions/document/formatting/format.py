@@ -31,8 +31,6 @@ from bt_actions.document.yaml.written import (
     scalars_of,
 )
 
-__all__ = ["FormatError", "format_source"]
-
 _STEP = 2
 _DASHES = re.compile(r"\s*-(\s+-)*\s*")
 

@@ -20,16 +20,6 @@ from py_trees.behaviour import Behaviour
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.suggest import did_you_mean, listing
 
-__all__ = [
-    "ClassError",
-    "Misfit",
-    "Python",
-    "find_behaviour",
-    "make_behaviour",
-    "refusal",
-    "wrong_arguments",
-]
-
 Python = bool | Collection[str]
 """Which classes a tree may name: all, none, or those of some packages."""
 

@@ -29,13 +29,6 @@ from bt_actions.document.yaml.nodes import Node
 from bt_actions.document.yaml.source import Source
 from bt_actions.goals.policy import RETRYABLE, Busy
 
-__all__ = [
-    "ACTION_KEYS", "ACTION_NAME", "ACTION_SERVER", "ACTION_TYPE", "ALIAS", "DEFAULTS", "DOING",
-    "INPUT", "LIBRARY_KEYS", "MESSAGE_TYPE", "NAMESPACE", "NODE", "NODES", "OUTPUT", "POLICIES",
-    "QOS", "RESULT", "RETRY", "SERVICE_RETRY", "TIMEOUT", "TOPIC", "TOPIC_NAME", "TOP_KEYS",
-    "keyed",
-]  # fmt: skip
-
 
 def keyed(*keys: Key) -> Mapping[str, Key]:
     return MappingProxyType({key.name: key for key in keys})

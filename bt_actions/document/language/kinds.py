@@ -57,8 +57,6 @@ from bt_actions.document.language.shapes import (
 if TYPE_CHECKING:
     from bt_actions.messages.interfaces import Kind as InterfaceKind
 
-__all__ = ["KINDS", "SERVICE_TIMEOUT", "Group", "Interface", "Kind"]
-
 _MESSAGE = frozenset({"message"})
 _RUN = frozenset({"result", "outputs"})
 _NAME = Key("name", NodeName(), "The node's name, where the kind's value does not say enough.")

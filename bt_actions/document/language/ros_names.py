@@ -15,8 +15,6 @@ from bt_actions.document.yaml.mistaken import warn_cut
 from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["LONGEST", "LONGEST_NAMESPACE", "RosName", "why_not"]
-
 LONGEST = 120
 LONGEST_NAMESPACE = 100
 """Characters. In ROS both have 247, with the 20 that an action adds to its name."""

@@ -25,11 +25,6 @@ from bt_actions.document.yaml.source import Source, spoken
 from bt_actions.utilities.suggest import did_you_mean
 from bt_actions.utilities.units import DURATION_UNITS, parse_duration
 
-__all__ = [
-    "Choice", "Condition", "Duration", "Flag", "Name", "NodeName", "Place", "Quantity", "Schema",
-    "Shape", "Text", "TypeName", "Whole", "is_computed", "read_computed", "words_for", "wrong_form",
-]  # fmt: skip
-
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _MARKED = re.compile(r"\$(?:[({]+\s*)?[A-Za-z_]")
 """A variable as a text or an expression holds it, or as other tools write one."""

@@ -10,8 +10,6 @@ from bt_actions.document.language.kinds import KINDS, Kind
 from bt_actions.document.language.scalars import Schema
 from bt_actions.document.language.shapes import Key, keys_schema
 
-__all__ = ["json_schema"]
-
 
 def json_schema() -> Schema:
     """The schema of a tree, or of a file that trees import (JSON Schema 2020-12)."""

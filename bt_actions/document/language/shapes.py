@@ -26,12 +26,6 @@ from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_
 from bt_actions.document.yaml.source import Source
 from bt_actions.utilities.suggest import did_you_mean
 
-__all__ = [
-    "AnyValue", "Key", "ListOf", "ListValue", "OneOf", "Record", "Table", "Values", "keys_schema",
-    "read_keys", "report_unknown_key", "required_in",
-]  # fmt: skip
-
-
 _NAME = Name()
 
 

@@ -24,9 +24,6 @@ from bt_actions.utilities.suggest import closest, did_you_mean, listing
 if TYPE_CHECKING:
     from bt_actions.messages.interfaces import Kind
 
-__all__ = ["PLAIN_TYPES", "Either", "Record", "TypeNameError", "fits", "interface_of", "meant_type",
-           "misfits", "parse_type"]  # fmt: skip
-
 PLAIN_TYPES = ("bool", *FLOATS, *(name for name in INTEGERS), "string")
 """The types that need no package."""
 _STAND_FOR = {

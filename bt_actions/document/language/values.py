@@ -34,31 +34,10 @@ from bt_actions.document.yaml.nodes import (
 )
 from bt_actions.document.yaml.source import SUFFIXES, Source, read_source
 from bt_actions.document.yaml.written import inner_span
-from bt_actions.expressions.expression import Expression, ExpressionError
+from bt_actions.expressions.expression import Expression
+from bt_actions.expressions.text import ExpressionError
 from bt_actions.expressions.values import MAX_ITEMS as MAX_TEXT
 from bt_actions.utilities.plain_data import numbers_only
-
-__all__ = [
-    "BAD",
-    "MAX_CHARACTERS",
-    "MAX_ITEMS",
-    "MAX_LEVELS",
-    "Computed",
-    "Interpolated",
-    "Lookup",
-    "computed_in",
-    "computes",
-    "constant_of",
-    "locate",
-    "names_file",
-    "names_value",
-    "read_data",
-    "read_expression",
-    "read_value",
-    "refuse_large",
-    "resolve",
-    "spoken",
-]
 
 MAX_ITEMS = 1_000_000
 """Numbers, texts, lists and mappings in one value, each counted as often as it can be reached."""

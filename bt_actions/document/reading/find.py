@@ -10,15 +10,6 @@ from pathlib import Path
 from bt_actions.document.yaml.source import broken_link
 from bt_actions.utilities.suggest import closest, did_you_mean, listing
 
-__all__ = [
-    "TreeNotFoundError",
-    "find_tree",
-    "installed_trees",
-    "is_file",
-    "tree_folder",
-    "tree_folders",
-]
-
 _SUFFIXES = (".yaml", ".yml")
 _MOST = 4
 """Folders that a message names."""
@@ -97,7 +88,7 @@ def installed_trees() -> dict[str, Path]:
         except OSError:
             continue
         for file in files:
-            if file.suffix in _SUFFIXES and not file.name.startswith("."):
+            if is_tree_file(file):
                 found.setdefault(file.stem, file)
     return found
 
@@ -175,7 +166,8 @@ def _nowhere(wanted: str, exact: Path, is_name: bool) -> str:
 def _beside(path: Path) -> str:
     """Which tree in the folder of a path that is not there may be meant."""
     try:
-        files = {each.stem: each.name for each in sorted(path.parent.iterdir()) if _is_tree(each)}
+        there = sorted(path.parent.iterdir())
+        files = {each.stem: each.name for each in there if is_tree_file(each)}
     except (OSError, ValueError):
         return ""
     near = path.stem if path.stem in files else closest(path.stem, files)
@@ -188,5 +180,6 @@ def _searched(exact: Path) -> str:
     return f"looked in {listing(dict.fromkeys(map(str, folders)), _MOST)}"
 
 
-def _is_tree(path: Path) -> bool:
+def is_tree_file(path: Path) -> bool:
+    """Whether a file is one of a tree, by its name."""
     return path.suffix in _SUFFIXES and not path.name.startswith(".")

@@ -23,17 +23,6 @@ from bt_actions.document.yaml.source import Source, TooManyErrors
 from bt_actions.messages.fields import Message, Scalar
 from bt_actions.utilities.suggest import did_you_mean, listing
 
-__all__ = [
-    "InputError",
-    "TreeInput",
-    "check_inputs",
-    "convert",
-    "inputs_of",
-    "parse_input",
-    "parse_text",
-    "refuse_infinite",
-]
-
 
 class InputError(ValueError):
     """A value given to a tree does not fit what it declares; the fault is the giver's."""

@@ -35,8 +35,6 @@ from bt_actions.document.yaml.nodes import (
 from bt_actions.messages.as_fields import as_fields
 from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
 
-__all__ = ["NODE_KEYS", "read_root"]
-
 _ACTION = KINDS["action"]
 _CHILDREN = ("child", "children")
 NODE_KEYS = frozenset(

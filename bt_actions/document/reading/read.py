@@ -22,8 +22,6 @@ from bt_actions.document.yaml.nodes import Mapping, span_of, start_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.utilities.suggest import closest
 
-__all__ = ["read_document"]
-
 
 def read_document(source: Source, *, library: bool = False) -> Document | None:
     """The document in a source, without its nodes (see `nodes.py`); None when there is none.

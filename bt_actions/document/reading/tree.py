@@ -17,11 +17,6 @@ from bt_actions.document.language.values import Computed
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 
-__all__ = [
-    "Declared", "Document", "TreeNode", "Write", "join_names", "merged", "resources_below",
-    "server_of", "settings_of", "shared_settings", "text_of", "when_of", "writes_of",
-]  # fmt: skip
-
 
 @dataclass(slots=True, eq=False, repr=False)
 class TreeNode:

@@ -15,8 +15,6 @@ from bt_actions.document.yaml.nodes import Node
 from bt_actions.document.yaml.source import Source
 from bt_actions.document.yaml.written import scalars_of
 
-__all__ = ["Doubts"]
-
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _NAME = re.compile(r"[A-Za-z0-9_ -]+")
 """What somebody may have written as a name, and no expression."""

@@ -20,8 +20,6 @@ from bt_actions.document.reading.tree import Declared, Document, TreeNode, merge
 from bt_actions.document.yaml.nodes import Listing, Node, span_of
 from bt_actions.document.yaml.source import SUFFIXES, Source, absolute, read_source
 
-__all__ = ["MAX_LEVELS", "MAX_TREE_NODES", "Workspace"]
-
 MAX_TREE_NODES = 1_000_000
 """Nodes of a tree after all that it includes was unfolded."""
 MAX_LEVELS = 200

@@ -27,8 +27,6 @@ from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source, TooManyErrors
 from bt_actions.document.yaml.syntax import report_syntax
 
-__all__ = ["MAX_DEPTH", "MAX_NODES", "compose", "compose_written"]
-
 MAX_DEPTH = 200
 """Levels of YAML nesting, aliases unfolded; a level of the tree takes two."""
 MAX_NODES = 2_000_000

@@ -12,15 +12,6 @@ from bt_actions.document.yaml.nodes import Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source, unquoted
 from bt_actions.utilities.units import TURN, spoken_duration
 
-__all__ = [
-    "cut_hint",
-    "report_braces",
-    "warn_bare_angle",
-    "warn_bare_duration",
-    "warn_cut",
-    "warn_quotes",
-]
-
 _LONGEST = 40
 """Characters of a number in a message."""
 _LONG = 500.0

@@ -13,20 +13,6 @@ from yaml import Mark
 
 from bt_actions.document.findings import Span
 
-__all__ = [
-    "NULLS",
-    "Alias",
-    "Listing",
-    "Mapping",
-    "Node",
-    "Scalar",
-    "beyond_floats",
-    "data_of",
-    "span_of",
-    "start_of",
-    "walk",
-]
-
 _NUMBER_START = frozenset("0123456789+-.")
 NULLS = frozenset({"", "~", "null", "Null", "NULL"})
 _WORDS: dict[str, object] = dict.fromkeys(NULLS) | {

@@ -21,11 +21,6 @@ from bt_actions.document.findings.rules import RULES
 if TYPE_CHECKING:
     from bt_actions.document.yaml.nodes import Node
 
-__all__ = [
-    "MAX_BYTES", "MAX_ERRORS", "SUFFIXES", "Char", "Source", "TooManyErrors", "Unread",
-    "absolute", "broken_link", "read_source", "read_stream", "source_of", "spoken", "unquoted",
-]  # fmt: skip
-
 MAX_BYTES = 32 * 1024 * 1024
 """The largest file that is read; a tree of 100,000 nodes has about a third of it."""
 MAX_ERRORS = 1000

@@ -14,8 +14,6 @@ from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
 from bt_actions.document.yaml.source import Source
 
-__all__ = ["report_syntax"]
-
 _OPENS = re.compile("flow mapping|flow sequence|quoted scalar")
 _EXPECTED = ("expected key", "expected '-' indicator", "expected <document start>")
 """What libyaml misses where a line is not indented as those that it belongs to."""

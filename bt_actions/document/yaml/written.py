@@ -19,11 +19,6 @@ from bt_actions.document.yaml.nodes import Node, Scalar, span_of, walk
 from bt_actions.document.yaml.source import Char, Source
 from bt_actions.utilities.suggest import did_you_mean
 
-__all__ = [
-    "Comment", "apply_ignores", "block_header", "comments_of", "inner_span", "is_ignore",
-    "scalars_of",
-]  # fmt: skip
-
 _LATER = (float("inf"), 0.0)
 _PROPERTY = re.compile(r"[&!]\S*\s+")
 _IGNORE = re.compile(r"(?:^|(?<=\s))#\s*bt:\s*ignore\b(?:\[([^\]]*)\])?")

@@ -1,1 +1,1 @@
-"""The steps of the table, by phase. What a step is stands in goals/facts.py."""
+"""The steps of the table, by phase; goals/facts.py has their class."""

@@ -46,7 +46,7 @@ def _plan_anew(goal: Facts, outcome: Outcome, why: str) -> None:
 
 @leads_to()
 def interrupted(goal: Facts) -> None:
-    """Whatever it was canceled for, its outcome will be CANCELED."""
+    """Decide CANCELED, whatever the goal was canceled for."""
     asked_at = goal.asking.asked_at
     is_news = goal.outcome is not None or goal.planned is not Outcome.CANCELED
     if is_news and asked_at is not None and goal.steady - asked_at >= ASK_AGAIN:
@@ -56,7 +56,7 @@ def interrupted(goal: Facts) -> None:
 
 @leads_to()
 def replaced(goal: Facts) -> None:
-    """Whatever it was canceled for, it must not be tried again beside the newer one."""
+    """Decide CANCELED, whatever the goal was canceled for: no attempt may be beside the newer."""
     _plan_anew(goal, Outcome.CANCELED, "replaced by a newer goal")
 
 
@@ -69,7 +69,7 @@ def taken_by_two(goal: Facts) -> None:
 
 @leads_to(State.DONE)
 def finished(goal: Facts) -> State:
-    """What it was canceled for; SUCCEEDED, late, if only a deadline had passed."""
+    """Decide what the goal was canceled for; SUCCEEDED, late, if only a deadline had passed."""
     if goal.take_result() == STATUS_SUCCEEDED and goal.planned not in NEVER_DONE:
         goal.settle(Outcome.SUCCEEDED, f"late: {goal.reason}")
     if goal.outcome is None and goal.asking.answer == CANCEL_REJECTED:
@@ -86,7 +86,7 @@ def cancel_answered(goal: Facts) -> None:
 
 @leads_to(State.DONE)
 def cancel_due(goal: Facts) -> State:
-    """The leaf is free; the server is asked on and on, unless the status shows the end."""
+    """Free the leaf; ask the server on and on, unless the status shows the end."""
     if goal.lost_result.status is None:
         goal.settle_as_planned()
         goal.ask()
@@ -110,7 +110,7 @@ def ask_again(goal: Facts) -> State:
 
 @leads_to(State.DONE)
 def drain_gave_up(goal: Facts) -> State:
-    """Nobody waits any longer; what is not known by now is UNKNOWN, and may become known."""
+    """Wait no longer; an end that is unknown by now is UNKNOWN, and may become known."""
     goal.asking.in_vain = True
     if goal.lost_result.questions > 0:
         return goal.end_by_status()
@@ -152,7 +152,7 @@ def _keep(goal: Facts) -> State:
 
 @leads_to(State.CANCELING, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED, State.NOT_RECEIVED)
 def returned(goal: Facts) -> State:
-    """Cancel what it may still run."""
+    """Cancel the goal, which the server may still run."""
     goal.asking.begin_anew(goal.steady)
     if goal.phase is State.NOT_RECEIVED:  # nor will it; to ask does no harm
         goal.commands.append(Command.CANCEL)
@@ -170,13 +170,13 @@ def returned(goal: Facts) -> State:
 
 @leads_to(State.CANCELING)
 def runs(goal: Facts) -> State:
-    """It runs, so its server is back: canceled at once."""
+    """Cancel at once: the goal runs, so its server is back."""
     return (returned if goal.accepted else requested.turned_up)(goal)
 
 
 @leads_to()
 def ask_another(goal: Facts) -> None:
-    """Ask for the result; what is to be canceled, is asked to cancel again, too."""
+    """Ask for the result; ask to cancel again, too, where the goal is to be canceled."""
     if goal.state not in (State.EXECUTING, State.REPLACED):
         goal.commands.append(Command.CANCEL)
     if goal.accepted:
@@ -185,5 +185,5 @@ def ask_another(goal: Facts) -> None:
 
 @leads_to(State.DONE)
 def abandoned(goal: Facts) -> State:
-    """Forget it; what is not known by now stays so."""
+    """Forget the goal; an end that is unknown by now stays so."""
     return State.DONE

@@ -35,7 +35,7 @@ def granted(goal: Facts) -> State:
 
 @leads_to(State.SENDING)
 def send(goal: Facts) -> State:
-    """Send it; until the server says how it ended, its end is UNKNOWN."""
+    """Send the request; until the server says how the goal ended, its end is UNKNOWN."""
     goal.deadlines.disarm(Event.SERVER_DUE)
     goal.deadlines.suspend(0.0, goal.deadlines.now)  # it was for a server that is out of sight
     goal.deadlines.arm(Event.ACCEPT_DUE, goal.timeouts.accept)
@@ -66,7 +66,7 @@ def begin(goal: Facts) -> State:
 
 @leads_to(State.DONE)
 def rejected(goal: Facts) -> State:
-    """Nothing was started: REJECTED, or what it was canceled for."""
+    """Decide REJECTED, or what the goal was canceled for; nothing was started."""
     goal.end = End.NEVER_STARTED
     why = f"{goal.server} refused the goal {goal.fields}".rstrip()
     if goal.planned is Outcome.ACCEPT_TIMEOUT:  # this is the answer, though late
@@ -105,7 +105,7 @@ def accept_due(goal: Facts) -> State:
 
 @leads_to(State.PRESUMED_NOT_RECEIVED, State.NOT_RECEIVED)
 def presume(goal: Facts) -> State:
-    """The leaf is free; if the server has denied the goal just now: NEVER_STARTED."""
+    """Free the leaf; if the server has denied the goal just now: NEVER_STARTED."""
     goal.settle_as_planned()
     if not goal.asking.denied_lately(goal.steady):
         goal.deadlines.arm(Event.ACCEPT_DUE, goal.patience)
@@ -117,7 +117,7 @@ def presume(goal: Facts) -> State:
 
 
 def _denied_for_long(goal: Facts) -> State:
-    """Ask once more when it has been denied for long enough, or believe it if it has."""
+    """Believe a denial that has lasted for long enough; else ask once more when it has."""
     left = goal.asking.left_to_deny(goal.steady)
     if left > 0.0:
         goal.deadlines.arm(Event.POLL_DUE, left)
@@ -129,7 +129,7 @@ def _denied_for_long(goal: Facts) -> State:
 
 @leads_to(State.NOT_RECEIVED)
 def denied_again(goal: Facts) -> State:
-    """Denied for 30 s, nobody need wait for it any more."""
+    """Let nobody wait for a goal that has been denied for 30 s."""
     goal.asking.answered(goal.detail, goal.steady)
     if not goal.asking.in_vain:  # after its server was back, it was UNKNOWN until now
         goal.end = End.NEVER_STARTED
@@ -138,7 +138,7 @@ def denied_again(goal: Facts) -> State:
 
 @leads_to(State.CANCELING)
 def turned_up(goal: Facts) -> State:
-    """It was accepted after nobody wanted it any more: canceled at once, however late."""
+    """Cancel at once, however late: the goal was accepted when nobody wanted it any more."""
     goal.end = End.UNKNOWN
     goal.asking.denied_since = math.inf
     goal.deadlines.disarm(Event.ACCEPT_DUE)

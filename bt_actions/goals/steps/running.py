@@ -22,7 +22,7 @@ from bt_actions.goals.terms import (
 
 @leads_to()
 def feedback(goal: Facts) -> None:
-    """The silence is over; timeout.feedback begins anew."""
+    """End the silence: timeout.feedback begins anew."""
     still_runs(goal)
     if goal.lost_result.status is None:
         goal.deadlines.arm(Event.FEEDBACK_DUE, goal.timeouts.feedback)
@@ -30,7 +30,7 @@ def feedback(goal: Facts) -> None:
 
 @leads_to()
 def still_runs(goal: Facts) -> None:
-    """It runs, whoever has denied it, or, long ago, shown that it had ended."""
+    """Believe that the goal runs, even if it was denied, or, long ago, shown as ended."""
     goal.feedback = goal.detail
     goal.lost_result.denials = 0
     if goal.lost_result.questions > 0:
@@ -39,7 +39,7 @@ def still_runs(goal: Facts) -> None:
 
 @leads_to()
 def status(goal: Facts) -> None:
-    """If it has ended, its result is due, and asked for again in case it was lost."""
+    """Ask again for the result of a goal that has ended, in case it was lost."""
     if goal.detail not in ENDS:
         goal.lost_result = LostResult()
     elif goal.lost_result.status is None:

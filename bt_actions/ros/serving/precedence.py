@@ -89,7 +89,7 @@ class Precedence:
         here = [name for name in names if name.startswith(f"{self._action}/_since/")]
         claims = sorted(found[0] for found in map(_CLAIM.search, here) if found)
         for claim in claims[: claims.index(self._mine)] if self._mine in claims else claims:
-            if who := _alive(claim):
+            if who := _claimant(claim):
                 return f"{who} has served {self._action} for longer"
         if servers <= len(claims):
             self._unclaimed_since = None
@@ -102,7 +102,7 @@ class Precedence:
         return f"another server of {self._action} is in sight, which is no server of trees"
 
 
-def _alive(claim: str) -> str:
+def _claimant(claim: str) -> str:
     """Whose claim it is, in words; "" for a process that is dead."""
     found = _CLAIM.search(claim)
     author = author_of(bytes.fromhex(found[2])) if found else None

@@ -35,26 +35,21 @@ class NodePlatform:
 
     @property
     def log(self) -> Log:
-        """The node's logger."""
         logger: Log = self._node.get_logger()
         return logger
 
     def now(self) -> float:
-        """Return the steady clock's seconds, the clock of the journal."""
         return time.monotonic()
 
     def timer(self, ring: Callable[[], None]) -> NodeTimer:
-        """Make a timer on the steady clock."""
         return NodeTimer(self._node, self._group, ring)
 
     def expand(self, name: str) -> str:
-        """Expand a name with the node's namespace."""
         return str(expand_topic_name(name, self._node.get_name(), self._node.get_namespace()))
 
     def serve(
         self, action_type: Any, name: str, server: Server, result_timeout: float
     ) -> InterceptedActionServer:
-        """Serve an action on the node."""
         return InterceptedActionServer(
             self._node,
             action_type,
@@ -65,7 +60,6 @@ class NodePlatform:
         )
 
     def publisher(self, message_type: Any, topic: str) -> NodePublisher:
-        """Make a publisher with rclpy's default settings."""
         return NodePublisher(self._node, message_type, topic)
 
 
@@ -84,7 +78,6 @@ class NodeTimer:
         )
 
     def set(self, when: float | None) -> None:
-        """Ring at `when` (time.monotonic)."""
         if when is None:
             self.rclpy_timer.cancel()
             return
@@ -111,7 +104,6 @@ class NodePublisher:
         self._publisher = closable(node.create_publisher(message_type, topic, 10))
 
     def publish(self, message: Any) -> None:
-        """Publish, with the node's time in the header."""
         if hasattr(message, "header"):
             message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)

@@ -43,13 +43,11 @@ class Taken:
 
     @property
     def goal_id(self) -> str:
-        """The id of the goal in question."""
         about = self.message.goal_info if self.kind == "cancel" else self.message
         return _hex(about.goal_id)
 
     @property
     def goal(self) -> Any:
-        """The goal message."""
         return self.message.goal
 
 
@@ -109,23 +107,18 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
     # For the server
 
     def answer_soon(self, request: Request, *, silent: bool = False) -> None:
-        """Have the executor answer, as soon as it can."""
         self._soon(self._accept_silently if silent else self._answer, request)
 
     def knows(self, goal_id: str) -> bool:
-        """Whether there is a handle of this goal."""
         return bytes.fromhex(goal_id) in self._goal_handles
 
     def start(self, goal_id: str) -> None:
-        """Set an accepted goal to EXECUTING."""
         self._handle_of(goal_id).execute()
 
     def feedback(self, goal_id: str, message: Any) -> None:
-        """Publish feedback."""
         self._handle_of(goal_id).publish_feedback(message)
 
     def end(self, goal_id: str, status: int) -> int:
-        """Set a goal to a terminal status, unless it has one."""
         handle = self._handle_of(goal_id)
         with contextlib.suppress(RCLError):  # it cannot be reached from the one it has
             if status == STATUS_SUCCEEDED:
@@ -137,7 +130,6 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
         return int(handle.status)
 
     def finish(self, goal_id: str, result: Any) -> None:
-        """Have the executor send the result."""
         self._soon(self._finish, goal_id, result)
 
     def _handle_of(self, goal_id: str) -> ServerGoalHandle:
@@ -152,7 +144,6 @@ class InterceptedActionServer(ActionServer):  # type: ignore[misc]
             executor.create_task(partial(_to_its_end, work, *arguments))
 
     def destroy(self) -> None:
-        """Go, at once and without a word to the clients."""
         if self._gone:
             return
         self._gone = True

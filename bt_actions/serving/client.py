@@ -11,18 +11,11 @@ from bt_actions_interfaces.msg import Rejection, TreeInfo
 from bt_actions_interfaces.srv import ControlTree, ListTrees
 from unique_identifier_msgs.msg import UUID
 
-from bt_actions.ros.serving.asking import Asker, answers, heard
+from bt_actions.ros.serving.questions import Asker, answers, heard
+from bt_actions.serving.control import COMMANDS
 from bt_actions.serving.rejections import REJECTIONS
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import listing
-
-__all__ = ["NotControlled", "control", "trees_in_sight", "why_rejected"]
-
-_COMMANDS = {
-    "pause": ControlTree.Request.PAUSE,
-    "resume": ControlTree.Request.RESUME,
-    "halt": ControlTree.Request.HALT,
-}
 
 
 class NotControlled(Exception):
@@ -59,7 +52,7 @@ def control(action: str, command: str, beginning: str) -> str:
         }
         goal_id = _chosen(action, runs, beginning)
         request = ControlTree.Request(
-            command=_COMMANDS[command],
+            command=COMMANDS[command],
             goal_id=UUID(uuid=list(bytes.fromhex(goal_id))),
             requested_by="bt-actions control",
         )
@@ -87,13 +80,13 @@ def _chosen(action: str, runs: dict[str, str], beginning: str) -> str:
 
 
 def why_rejected(goal_name: str) -> Rejection | None:
-    """The first rejection of a goal of this name that any server in sight tells of."""
+    """Return the first rejection of a goal of this name that any server in sight tells of."""
     with contextlib.closing(heard(Rejection, REJECTIONS)) as rejections:
         return next((each for each in rejections if each.goal_name == goal_name), None)
 
 
 def trees_in_sight(namespace: str = "") -> dict[str, list[TreeInfo] | None]:
-    """The trees of each server below a namespace, by its node's name; None: it does not answer."""
+    """Return the trees of the servers below a namespace, by node; None: no answer."""
     return {
         service.removesuffix("/list_trees"): None if told is None else list(told.trees)
         for service, told in answers(ListTrees, namespace).items()
