@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.reads import find_early_reads, find_missing
 from bt_actions.document.checking.verdicts import BEGUN, Verdicts
-from bt_actions.document.findings import Related, Span
+from bt_actions.document.findings import Related
 from bt_actions.document.language.values import names_value
 from bt_actions.document.reading.tree import (
     Declared,
@@ -22,7 +22,7 @@ from bt_actions.document.reading.tree import (
 )
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
-from bt_actions.document.yaml.nodes import span_of
+from bt_actions.document.yaml.nodes import Node, span_of
 
 _BUSY = BEGUN | {"wait_until", "running", "python", "retry", "repeat", "for_each"}
 _LOOPED = ("as", "index")
@@ -42,6 +42,7 @@ class _Hazards:
         self._doubts = checker.doubts
         self._document: Document = checker.document
         self._source = checker.source
+        self._report = checker.source.report
         self._verdicts = Verdicts()
         self._at_once = Verdicts(at_once=True)
         self._held: dict[tuple[int, str], dict[str, TreeNode]] = {}
@@ -59,9 +60,6 @@ class _Hazards:
         find_early_reads(self._checker, root)
         find_missing(self._checker, root)
         self._unused()
-
-    def _report(self, code: str, span: Span, message: str, **more: object) -> None:
-        self._source.report(code, span, message, **more)  # type: ignore[arg-type]
 
     def _walk(self, root: TreeNode, *, bounded: bool) -> None:
         loops: dict[str, TreeNode] = {}
@@ -114,9 +112,9 @@ class _Hazards:
         else:
             self._no_result_timeout(node.key, f"{node.name or 'this action'} may take for ever")
 
-    def _no_result_timeout(self, at: object, message: str) -> None:
+    def _no_result_timeout(self, at: Node, message: str) -> None:
         hint = "timeout: 30 s, or {result: none} where it is meant"
-        self._report("BT301", span_of(at), message, hint=hint)  # type: ignore[arg-type]
+        self._report("BT301", span_of(at), message, hint=hint)
 
     def _result_timeouts(self) -> None:
         for name, node in self._unbounded.items():

@@ -50,15 +50,6 @@ _RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "sensor_msgs/msg/RelativeHumidity": {"relative_humidity": (0.0, 1.0)},
 }
 """Fields of common messages that never leave a range, as their .msg files say: BT321."""
-_OUTCOMES: Mapping[type[ast.cmpop], tuple[bool, bool]] = {
-    ast.Lt: (False, True),
-    ast.LtE: (False, True),
-    ast.Gt: (True, False),
-    ast.GtE: (True, False),
-    ast.Eq: (False, False),
-    ast.NotEq: (True, True),
-}
-"""What a field's comparison with a number gives: with one below its range, with one above."""
 _TURNED: Mapping[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE
 }  # fmt: skip
@@ -400,12 +391,14 @@ def _never_held(cls: type, name: str, op: ast.cmpop, number: float, *, first: bo
     """What is wrong with a field that is compared with a number; `first` is the field, or not."""
     allowed = _RANGES.get(interface_name(cls), {}).get(name)
     kind = type(op) if first else _TURNED.get(type(op), type(op))
-    if allowed is None or kind not in _OUTCOMES:
+    if allowed is None or kind not in (*_TURNED, ast.Eq, ast.NotEq):
         return None
     least, most = allowed
     above = number > most or (number == most and kind is ast.Gt)
     if not above and number >= least:
         return None
-    outcome = "true" if _OUTCOMES[kind][above] else "false"
+    ordered = kind in _TURNED
+    holds = (kind in (ast.Lt, ast.LtE)) is above if ordered else kind is ast.NotEq
+    outcome = "true" if holds else "false"
     percent = f"; write {number / 100:g}" if allowed == (0.0, 1.0) and 2 <= number <= 100 else ""
     return f"{cls.__name__}.{name} is {least:g} to {most:g}: this is always {outcome}{percent}"

@@ -107,15 +107,15 @@ def _outputs(checker: Checker, node: TreeNode) -> None:
         checker.assigns(key.text, checker.declared_type(declared), inner)
 
 
-def _condition_of(key: str) -> Callable[[Checker, TreeNode], None]:
-    return lambda checker, node: checker.condition(node.values.get(key), {})
+def _condition(checker: Checker, node: TreeNode) -> None:
+    checker.condition(node.values.get(node.kind.reads), {})
 
 
-def _number_of(
-    key: str, wanted: FieldType, least: float = 0, *, zero: bool = True
+def _number(
+    wanted: FieldType, least: float = 0, *, zero: bool = True
 ) -> Callable[[Checker, TreeNode], None]:
     def check(checker: Checker, node: TreeNode) -> None:
-        value = node.values.get(key)
+        value = node.values.get(node.kind.reads)
         if not isinstance(value, Computed):
             return
         given = checker.expression(value, {})
@@ -245,23 +245,23 @@ def _python(checker: Checker, node: TreeNode) -> None:
 CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
     {
         "action": _call,
-        "check": _condition_of("check"),
+        "check": _condition,
         "for_each": _for_each,
         "log": _log,
         "parallel": _parallel,
         "publish": _publish,
         "python": _python,
-        "repeat": _number_of("times", INTEGER),
-        "retry": _number_of("attempts", INTEGER, 1),
+        "repeat": _number(INTEGER),
+        "retry": _number(INTEGER, 1),
         "run_tree": _run_tree,
         "service": _call,
         "set": _set,
         "subtree": _subtree,
-        "timeout": _number_of("after", FLOAT, zero=False),
-        "wait": _number_of("wait", FLOAT),
+        "timeout": _number(FLOAT, zero=False),
+        "wait": _number(FLOAT),
         "wait_for_message": _call,
-        "wait_until": _condition_of("wait_until"),
-        "while": _condition_of("while"),
+        "wait_until": _condition,
+        "while": _condition,
     }
 )
 """The checks by the name of the kind."""

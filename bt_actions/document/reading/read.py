@@ -40,20 +40,21 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
         source.report("BT106", span_of(node), message, hint=hint)
         return None
     document = Document(source, node)
-    if not library and node.get("root") is None and node.get("tree") is None:
+    has_root = node.get("root") is not None
+    if not library and not has_root and node.get("tree") is None:
         library = any(node.get(name) is not None for name in ("actions", "topics", "defaults"))
-    keys = LIBRARY_KEYS if library else TOP_KEYS
-    if library and node.get("root") is not None:
-        keys = TOP_KEYS
-    if not library and node.get("root") is None and node.get("tree") is None:
-        source.report(
-            "BT106", start_of(node), "this is not a tree: the keys 'tree' and 'root' are missing"
-        )
-        return None
+        if not library:
+            message = "this is not a tree: the keys 'tree' and 'root' are missing"
+            source.report("BT106", start_of(node), message)
+            return None
+    keys = TOP_KEYS if has_root or not library else LIBRARY_KEYS
     misplaced = _misplaced(node, keys, source) if "root" in keys else []
     values = read_keys(node, keys, source, {"root", *misplaced})
-    wanted = "root" in keys and not library and node.get("root") is None
-    if wanted and all(closest(key.text, keys) != "root" for key, _ in node.pairs):
+    if (
+        not library
+        and not has_root
+        and all(closest(key.text, keys) != "root" for key, _ in node.pairs)
+    ):
         message = "the key 'root' is missing: it holds the tree's nodes"
         source.report("BT108", start_of(node), message)
     document.values = values
