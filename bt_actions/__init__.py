@@ -21,7 +21,7 @@ if _TYPE_CHECKING:
     from bt_actions.document import load_tree
     from bt_actions.goals.attempts import AttemptRecord
     from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
-    from bt_actions.running.goals import GoalReport
+    from bt_actions.goals.unaccounted import GoalReport
     from bt_actions.running.loop import TreeError
     from bt_actions.running.runner import TreeRunner
 
@@ -56,7 +56,7 @@ _PLACES = {
     "document": ["load_tree"],
     "goals.attempts": ["AttemptRecord"],
     "goals.policy": ["Busy", "End", "Outcome", "Retry", "Timeouts"],
-    "running.goals": ["GoalReport"],
+    "goals.unaccounted": ["GoalReport"],
     "running.loop": ["TreeError"],
     "running.runner": ["TreeRunner"],
 }

@@ -11,7 +11,7 @@ from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.traffic.backend import Backend
-from bt_actions.traffic.host import Record
+from bt_actions.traffic.state import Record
 
 if TYPE_CHECKING:
     from bt_actions.ros.log import Log

@@ -7,11 +7,13 @@ which only shrinks: one that is needed no more has to go.
 from __future__ import annotations
 
 import ast
+import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 import bt_actions
+from bt_actions import traffic
 
 ROOT = Path(bt_actions.__file__).parent
 ROOMS = [
@@ -165,6 +167,14 @@ def circles() -> list[set[str]]:
 
 def test_no_files_import_each_other() -> None:
     assert circles() == CIRCLES
+
+
+def test_the_files_of_traffic_import_those_that_its_head_names_before_them() -> None:
+    _, _, below_to_above = (traffic.__doc__ or "").partition("From below to above")
+    order = [f"traffic/{name}" for name in re.findall(r"\w+\.py", below_to_above)]
+    assert {"traffic/__init__.py", *order} == {file for file in GRAPH if room_of(file) == "traffic"}
+    for at, file in enumerate(order):
+        assert not GRAPH[file] & set(order[at:])
 
 
 def test_no_file_is_long() -> None:

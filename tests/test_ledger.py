@@ -18,7 +18,7 @@ import pytest
 from bt_actions.goals.ids import new_goal_id
 from bt_actions.recovery import ledger as module
 from bt_actions.recovery.ledger import KEPT_FOR, LENGTH, Ledger, Sent, left_behind
-from bt_actions.traffic.host import Entry
+from bt_actions.traffic.state import Entry
 from tests.support import records
 
 SERVERS = frozenset({b"a" * 16, b"b" * 16})
@@ -26,7 +26,7 @@ LEAVES = """
 import os, sys
 from bt_actions.goals.ids import new_goal_id
 from bt_actions.recovery.ledger import Ledger
-from bt_actions.traffic.host import Entry
+from bt_actions.traffic.state import Entry
 ledger, ids = Ledger(print), [new_goal_id() for _ in range(4)]
 for number, goal_id in enumerate(ids):
     servers = frozenset({b"a" * 16})

@@ -24,12 +24,12 @@ def gids(*which: bytes) -> frozenset[bytes]:
 @pytest.fixture
 def watch() -> ServerWatch:
     seen = ServerWatch()
-    seen.observe(0.0, True, gids(OLD))
+    seen.see(0.0, True, gids(OLD))
     return seen
 
 
 def crowd(watch: ServerWatch, at: float = 1.0) -> ServerWatch:
-    watch.observe(at, True, gids(OLD, NEW))
+    watch.see(at, True, gids(OLD, NEW))
     watch.probe_sent(at, 1)
     return watch
 
@@ -38,7 +38,7 @@ def settle(watch: ServerWatch, at: float = 1.0) -> ServerWatch:
     """Show a dead server and its successor, and let only the successor answer."""
     crowd(watch, at)
     watch.probe_answered(at + 0.1, 1)
-    watch.observe(at + 0.1 + SLOWEST_START, True, gids(OLD, NEW))
+    watch.see(at + 0.1 + SLOWEST_START, True, gids(OLD, NEW))
     return watch
 
 
@@ -53,9 +53,9 @@ def test_one_that_is_ready_is_ready(watch: ServerWatch) -> None:
 
 
 def test_without_its_services_or_its_status_topic_it_is_absent(watch: ServerWatch) -> None:
-    watch.observe(1.0, False, gids(OLD))
+    watch.see(1.0, False, gids(OLD))
     assert watch.state(1.0) is Server.ABSENT
-    watch.observe(2.0, True, gids())
+    watch.see(2.0, True, gids())
     assert watch.state(2.0) is Server.ABSENT
 
 
@@ -73,9 +73,9 @@ def test_two_answers_to_one_probe_are_two_servers(watch: ServerWatch) -> None:
 def test_one_answer_and_silence_are_a_dead_server_and_its_successor(watch: ServerWatch) -> None:
     late = 1.0 + SLOWEST_START
     crowd(watch).probe_answered(late, 1)
-    watch.observe(late + NO_SECOND_AFTER / 2, True, gids(OLD, NEW))
+    watch.see(late + NO_SECOND_AFTER / 2, True, gids(OLD, NEW))
     assert watch.state(late + NO_SECOND_AFTER / 2) is Server.UNCLEAR
-    watch.observe(late + NO_SECOND_AFTER, True, gids(OLD, NEW))
+    watch.see(late + NO_SECOND_AFTER, True, gids(OLD, NEW))
     assert watch.state(late + NO_SECOND_AFTER) is Server.READY
     assert watch.alone
 
@@ -84,7 +84,7 @@ def test_a_server_that_has_just_come_in_sight_is_given_time_to_answer_too(
     watch: ServerWatch,
 ) -> None:
     crowd(watch).probe_answered(1.01, 1)
-    watch.observe(1.0 + SLOWEST_START - 0.1, True, gids(OLD, NEW))
+    watch.see(1.0 + SLOWEST_START - 0.1, True, gids(OLD, NEW))
     assert not watch.alone, "the old one answered at once; the new one may be slow"
     watch.probe_answered(1.0 + SLOWEST_START - 0.1, 1)
     assert watch.state(1.0 + SLOWEST_START) is Server.AMBIGUOUS
@@ -100,7 +100,7 @@ def test_answers_to_two_probes_are_not_two_answers(watch: ServerWatch) -> None:
 def test_a_second_answer_that_is_late_still_shows_two_servers(watch: ServerWatch) -> None:
     settle(watch).probe_answered(4.0, 1)
     assert watch.state(4.0) is Server.AMBIGUOUS
-    watch.observe(5.0, True, gids(OLD, NEW))
+    watch.see(5.0, True, gids(OLD, NEW))
     assert watch.state(5.0) is Server.AMBIGUOUS, "one answer to another probe changes nothing"
 
 
@@ -125,7 +125,7 @@ def test_what_is_shown_beyond_the_lease_is_a_server(watch: ServerWatch) -> None:
 
 
 def test_when_the_dead_one_is_gone_there_is_one_again(watch: ServerWatch) -> None:
-    crowd(watch).observe(20.0, True, gids(NEW))
+    crowd(watch).see(20.0, True, gids(NEW))
     assert watch.state(20.0) is Server.READY
     assert not watch.alone
     assert not watch.wants_probe(20.0)
@@ -139,18 +139,18 @@ def test_it_is_probed_now_and_then_while_the_question_is_open(watch: ServerWatch
 
 
 def test_it_is_gone_when_it_is_not_ready_for_a_while_but_not_at_once(watch: ServerWatch) -> None:
-    watch.observe(1.0, True, gids(OLD))
-    watch.observe(1.2, False, gids(OLD))
+    watch.see(1.0, True, gids(OLD))
+    watch.see(1.2, False, gids(OLD))
     assert not watch.gone(1.2, gids(OLD))
     late = 1.2 + NOT_READY_FOR
-    watch.observe(late, False, gids(OLD))
+    watch.see(late, False, gids(OLD))
     assert watch.gone(late, gids(OLD))
-    watch.observe(late + 0.1, True, gids(OLD))
+    watch.see(late + 0.1, True, gids(OLD))
     assert not watch.gone(late + 0.1, gids(OLD))
 
 
 def test_one_that_is_not_ready_is_asked_and_is_not_gone_while_it_speaks(watch: ServerWatch) -> None:
-    watch.observe(1.0, False, gids(OLD))
+    watch.see(1.0, False, gids(OLD))
     assert not watch.wants_probe(1.0), "nothing runs there"
     assert watch.wants_probe(1.0, runs=True)
     assert not watch.wants_probe(1.0, runs=True)
@@ -165,16 +165,16 @@ def test_a_second_server_that_is_discovered_in_part_does_not_make_the_first_gone
     watch: ServerWatch,
 ) -> None:
     """A name is ready only where all services of all its servers are matched."""
-    watch.observe(1.0, False, gids(OLD, NEW))
+    watch.see(1.0, False, gids(OLD, NEW))
     assert not watch.gone(60.0, gids(OLD))
-    watch.observe(61.0, False, gids(NEW))
+    watch.see(61.0, False, gids(NEW))
     assert watch.gone(61.0, gids(OLD))
 
 
 def test_a_newcomer_is_a_change_and_a_departure_is_not(watch: ServerWatch) -> None:
     assert not watch.changed(gids(OLD))
     assert crowd(watch).changed(gids(OLD))
-    watch.observe(2.0, True, gids(NEW))
+    watch.see(2.0, True, gids(NEW))
     assert not watch.changed(gids(OLD, NEW))
 
 
@@ -184,7 +184,7 @@ def test_after_a_stall_of_ours_answers_have_time_to_come_in(watch: ServerWatch) 
     late = 1.0 + SLOWEST_START
     watch.stood_still(late)
     for now in (late, late + 0.9 * NO_SECOND_AFTER):
-        watch.observe(now, True, gids(OLD, NEW))
+        watch.see(now, True, gids(OLD, NEW))
         assert watch.state(now) is Server.UNCLEAR
-    watch.observe(late + NO_SECOND_AFTER, True, gids(OLD, NEW))
+    watch.see(late + NO_SECOND_AFTER, True, gids(OLD, NEW))
     assert watch.state(late + NO_SECOND_AFTER) is Server.READY

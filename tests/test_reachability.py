@@ -19,7 +19,7 @@ def reachability() -> Reachability:
     """Asked at 10 s, and answered."""
     fresh = Reachability()
     fresh.asked(10.0)
-    fresh.answered(10.0)
+    fresh.answer_came(10.0)
     return fresh
 
 
@@ -44,17 +44,17 @@ def test_who_is_silent_may_not_hear_and_is_not_pestered(reachability: Reachabili
         "questions that get lost do not put it off"
     )
     assert not reachability.take_question(99.0)
-    reachability.answered(20.0 + UNRESPONSIVE_AFTER - 0.1)
+    reachability.answer_came(20.0 + UNRESPONSIVE_AFTER - 0.1)
     assert not reachability.is_unresponsive(99.0)
 
 
 def test_an_answer_of_before_the_stall_proves_nothing(reachability: Reachability) -> None:
     reachability.asked(20.0)
     reachability.doubt(30.0)
-    reachability.answered(20.0)
+    reachability.answer_came(20.0)
     assert reachability.in_doubt(31.0) == DOUBT_LASTS - 1.0
     assert reachability.is_unresponsive(30.0 + UNRESPONSIVE_AFTER)
-    reachability.answered(30.0)
+    reachability.answer_came(30.0)
     assert not reachability.in_doubt(31.0)
     assert not reachability.is_unresponsive(99.0)
 

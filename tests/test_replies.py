@@ -25,7 +25,7 @@ def events(told: replies.Told) -> list[Event]:
 @pytest.fixture
 def watch() -> ServerWatch:
     seen = ServerWatch()
-    seen.observe(0.0, True, frozenset({ONE}))
+    seen.see(0.0, True, frozenset({ONE}))
     return seen
 
 
@@ -35,14 +35,14 @@ def sent(watch: ServerWatch) -> replies.Replies:
     for event in (Event.GRANTED, Event.SERVER_READY):
         goal.on(event, Now(0.0, 0.0))
     said = replies.Replies(goal)
-    said.sent(watch)
+    said.count_receivers(watch)
     return said
 
 
 @pytest.fixture
 def said(watch: ServerWatch) -> replies.Replies:
     """Of a goal that was sent while a second server opened."""
-    watch.observe(0.0, True, BOTH)
+    watch.see(0.0, True, BOTH)
     return sent(watch)
 
 
@@ -51,92 +51,97 @@ def alone(watch: ServerWatch) -> float:
     watch.probe_sent(0.0, 1)
     watch.probe_answered(0.0, 1)
     now = SLOWEST_START + NO_SECOND_AFTER
-    watch.observe(now, True, BOTH)
+    watch.see(now, True, BOTH)
     assert watch.alone
     return now
 
 
 def test_one_server_is_believed_at_once(watch: ServerWatch) -> None:
     said = sent(watch)
-    assert said.answered("goal", watch, 0.0, 0.0, [True]) == (Event.ACCEPTED, None)
-    assert said.answered("goal", watch, 0.0, 0.0, [False]) == (Event.REJECTED, None)
-    assert said.answered("cancel", watch, 0.0, 0.0, [DENIED]) == (Event.CANCEL_ANSWERED, DENIED)
-    assert said.answered("result", watch, 0.0, 0.0, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
-    assert said.answered("result", watch, 0.0, 0.0, [UNKNOWN]) == (Event.RESULT_UNKNOWN, None)
+    assert said.weigh_answer("goal", watch, 0.0, 0.0, [True]) == (Event.ACCEPTED, None)
+    assert said.weigh_answer("goal", watch, 0.0, 0.0, [False]) == (Event.REJECTED, None)
+    assert said.weigh_answer("cancel", watch, 0.0, 0.0, [DENIED]) == (Event.CANCEL_ANSWERED, DENIED)
+    assert said.weigh_answer("result", watch, 0.0, 0.0, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
+    assert said.weigh_answer("result", watch, 0.0, 0.0, [UNKNOWN]) == (Event.RESULT_UNKNOWN, None)
 
 
 def test_an_acceptance_is_believed_and_a_second_one_shows_that_it_runs_twice(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
-    assert events(said.answered("goal", watch, 0.0, 0.0, [True])) == [Event.ACCEPTED]
-    assert events(said.answered("goal", watch, 0.0, 0.0, [True, True])) == [Event.SERVER_AMBIGUOUS]
+    assert events(said.weigh_answer("goal", watch, 0.0, 0.0, [True])) == [Event.ACCEPTED]
+    assert events(said.weigh_answer("goal", watch, 0.0, 0.0, [True, True])) == [
+        Event.SERVER_AMBIGUOUS
+    ]
     assert watch.both_live
 
 
 def test_one_server_that_accepts_twice_is_one_server(watch: ServerWatch) -> None:
     said = replies.Replies(Goal(b"1", "move", Timeouts(), Now(0.0, 0.0)))
     said.sent_to = frozenset({ONE})
-    assert said.answered("goal", watch, 0.0, 0.0, [True, True]) is None
+    assert said.weigh_answer("goal", watch, 0.0, 0.0, [True, True]) is None
     assert not watch.both_live
 
 
 def test_what_one_refuses_the_other_may_accept(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.answered("goal", watch, 0.0, 0.0, [False]) is None
-    assert events(said.answered("goal", watch, 0.0, 0.0, [False, True])) == [Event.ACCEPTED]
-    assert said.answered("goal", watch, 0.0, 0.0, [True, False]) is None
-    assert events(said.answered("goal", watch, 0.0, 0.0, [False, False])) == [Event.REJECTED]
+    assert said.weigh_answer("goal", watch, 0.0, 0.0, [False]) is None
+    assert events(said.weigh_answer("goal", watch, 0.0, 0.0, [False, True])) == [Event.ACCEPTED]
+    assert said.weigh_answer("goal", watch, 0.0, 0.0, [True, False]) is None
+    assert events(said.weigh_answer("goal", watch, 0.0, 0.0, [False, False])) == [Event.REJECTED]
 
 
 def test_a_refusal_counts_when_the_other_is_dead(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.answered("goal", watch, 0.0, 0.0, [False]) is None
-    assert said.looked(watch, 0.0) is None
-    assert events(said.looked(watch, alone(watch))) == [Event.REJECTED]
+    assert said.weigh_answer("goal", watch, 0.0, 0.0, [False]) is None
+    assert said.weigh_sight(watch, 0.0) is None
+    assert events(said.weigh_sight(watch, alone(watch))) == [Event.REJECTED]
 
 
 def test_what_one_has_ended_the_other_may_run(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.answered("result", watch, 0.0, 0.0, [ABORTED]) is None
-    assert said.answered("result", watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == (Event.RESULT, ABORTED)
+    assert said.weigh_answer("result", watch, 0.0, 0.0, [ABORTED]) is None
+    assert said.weigh_answer("result", watch, 0.0, 0.0, [ABORTED, UNKNOWN]) == (
+        Event.RESULT,
+        ABORTED,
+    )
 
 
 def test_what_both_have_ended_was_at_two_servers(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.answered("result", watch, 0.0, 0.0, [ABORTED]) is None
-    told = said.answered("result", watch, 0.0, 0.0, [ABORTED, SUCCEEDED])
+    assert said.weigh_answer("result", watch, 0.0, 0.0, [ABORTED]) is None
+    told = said.weigh_answer("result", watch, 0.0, 0.0, [ABORTED, SUCCEEDED])
     assert told == (Event.SERVER_AMBIGUOUS, SUCCEEDED)
     assert watch.both_live
 
 
 def test_an_end_counts_when_the_other_is_dead(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.answered("result", watch, 0.0, 0.0, [ABORTED]) is None
-    assert said.looked(watch, 0.0) is None
-    assert said.looked(watch, alone(watch)) == (Event.RESULT, ABORTED)
+    assert said.weigh_answer("result", watch, 0.0, 0.0, [ABORTED]) is None
+    assert said.weigh_sight(watch, 0.0) is None
+    assert said.weigh_sight(watch, alone(watch)) == (Event.RESULT, ABORTED)
 
 
 def test_an_end_may_be_that_of_the_one_that_has_gone_since(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
-    assert said.looked(watch, 0.0) is None
-    assert said.answered("result", watch, 0.0, 0.0, [ABORTED]) is None
-    watch.observe(1.0, True, frozenset({ONE}))
-    assert events(said.looked(watch, 1.0)) == [Event.SERVER_CHANGED], "ask whoever is left"
-    assert said.answered("result", watch, 1.1, 0.9, [ABORTED]) is None, (
+    assert said.weigh_sight(watch, 0.0) is None
+    assert said.weigh_answer("result", watch, 0.0, 0.0, [ABORTED]) is None
+    watch.see(1.0, True, frozenset({ONE}))
+    assert events(said.weigh_sight(watch, 1.0)) == [Event.SERVER_CHANGED], "ask whoever is left"
+    assert said.weigh_answer("result", watch, 1.1, 0.9, [ABORTED]) is None, (
         "asked while both were there"
     )
-    assert said.answered("result", watch, 1.2, 1.1, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
+    assert said.weigh_answer("result", watch, 1.2, 1.1, [SUCCEEDED]) == (Event.RESULT, SUCCEEDED)
 
 
 def test_what_one_denies_the_other_may_have(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.answered("cancel", watch, 0.0, 0.0, [DENIED]) is None
-    assert said.answered("cancel", watch, 0.0, 0.0, [DENIED, CANCELED]) == (
+    assert said.weigh_answer("cancel", watch, 0.0, 0.0, [DENIED]) is None
+    assert said.weigh_answer("cancel", watch, 0.0, 0.0, [DENIED, CANCELED]) == (
         Event.CANCEL_ANSWERED,
         CANCELED,
     )
-    assert said.answered("cancel", watch, 0.0, 0.0, [CANCELED, DENIED]) is None
-    assert said.answered("cancel", watch, 0.0, 0.0, [DENIED, DENIED]) == (
+    assert said.weigh_answer("cancel", watch, 0.0, 0.0, [CANCELED, DENIED]) is None
+    assert said.weigh_answer("cancel", watch, 0.0, 0.0, [DENIED, DENIED]) == (
         Event.CANCEL_ANSWERED,
         DENIED,
     )
-    assert said.answered("result", watch, 0.0, 0.0, [UNKNOWN]) is None
-    assert events(said.answered("result", watch, 0.0, 0.0, [UNKNOWN, UNKNOWN])) == [
+    assert said.weigh_answer("result", watch, 0.0, 0.0, [UNKNOWN]) is None
+    assert events(said.weigh_answer("result", watch, 0.0, 0.0, [UNKNOWN, UNKNOWN])) == [
         Event.RESULT_UNKNOWN
     ]
 
@@ -144,25 +149,25 @@ def test_what_one_denies_the_other_may_have(said: replies.Replies, watch: Server
 def test_two_that_live_are_told_of_where_both_may_have_it(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
-    assert said.looked(watch, 0.0) is None
+    assert said.weigh_sight(watch, 0.0) is None
     watch.two_answered()
-    assert events(said.looked(watch, 0.0)) == [Event.SERVER_AMBIGUOUS]
+    assert events(said.weigh_sight(watch, 0.0)) == [Event.SERVER_AMBIGUOUS]
     said.sent_to = frozenset({ONE})
-    assert Event.SERVER_AMBIGUOUS not in events(said.looked(watch, 0.0)), "it came later"
+    assert Event.SERVER_AMBIGUOUS not in events(said.weigh_sight(watch, 0.0)), "it came later"
 
 
 def test_a_lost_server_is_back_only_when_it_can_be_talked_to(
     said: replies.Replies, watch: ServerWatch
 ) -> None:
-    watch.observe(1.0, False, frozenset())
-    assert events(said.looked(watch, 1.0)) == [Event.SERVER_LOST]
+    watch.see(1.0, False, frozenset())
+    assert events(said.weigh_sight(watch, 1.0)) == [Event.SERVER_LOST]
     said._goal.on(Event.SERVER_LOST, Now(1.0, 1.0))
-    watch.observe(2.0, False, BOTH)
-    assert said.looked(watch, 2.0) is None
-    watch.observe(2.1, True, BOTH)
-    assert events(said.looked(watch, 2.1)) == [Event.SERVER_RETURNED]
+    watch.see(2.0, False, BOTH)
+    assert said.weigh_sight(watch, 2.0) is None
+    watch.see(2.1, True, BOTH)
+    assert events(said.weigh_sight(watch, 2.1)) == [Event.SERVER_RETURNED]
     said._goal.on(Event.SERVER_RETURNED, Now(2.1, 2.1))
-    assert said.looked(watch, 2.2) is None
+    assert said.weigh_sight(watch, 2.2) is None
 
 
 def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_restarted(
@@ -170,9 +175,9 @@ def test_a_successor_that_denies_it_and_is_alone_shows_that_the_server_was_resta
 ) -> None:
     said.sent_to = frozenset({ONE})
     said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
-    assert events(said.looked(watch, 0.0)) == [Event.SERVER_CHANGED]
-    assert said.answered("result", watch, 0.0, 0.0, [UNKNOWN]) is None
-    assert events(said.looked(watch, alone(watch))) == [Event.SERVER_LOST]
+    assert events(said.weigh_sight(watch, 0.0)) == [Event.SERVER_CHANGED]
+    assert said.weigh_answer("result", watch, 0.0, 0.0, [UNKNOWN]) is None
+    assert events(said.weigh_sight(watch, alone(watch))) == [Event.SERVER_LOST]
 
 
 @pytest.mark.parametrize("how", ["both answer", "two of three, none dead", "the other has gone"])
@@ -181,37 +186,39 @@ def test_a_server_that_was_taken_for_dead_is_back_when_that_was_wrong(
 ) -> None:
     said.sent_to = frozenset({ONE})
     said._goal.on(Event.ACCEPTED, Now(0.0, 0.0))
-    said.looked(watch, 0.0)
-    said.answered("result", watch, 0.0, 0.0, [UNKNOWN])
+    said.weigh_sight(watch, 0.0)
+    said.weigh_answer("result", watch, 0.0, 0.0, [UNKNOWN])
     now = alone(watch)
-    told(said, said.looked(watch, now), now)
+    told(said, said.weigh_sight(watch, now), now)
     assert said._goal.lost
-    assert said.looked(watch, now) is None, "it is still taken for one"
+    assert said.weigh_sight(watch, now) is None, "it is still taken for one"
     if how == "both answer":
         watch.probe_answered(now, 1)
-        watch.observe(now, False, BOTH)
-        assert said.looked(watch, now) is None, "it cannot be talked to"
-        watch.observe(now, True, BOTH)
+        watch.see(now, False, BOTH)
+        assert said.weigh_sight(watch, now) is None, "it cannot be talked to"
+        watch.see(now, True, BOTH)
     elif how == "two of three, none dead":
-        watch.observe(now, True, BOTH | {b"third"})
+        watch.see(now, True, BOTH | {b"third"})
         watch.two_answered()
-        assert said.looked(watch, now) is None, "these may be the other two"
+        assert said.weigh_sight(watch, now) is None, "these may be the other two"
         now += LEASE + 1.0
     else:
-        watch.observe(now, True, frozenset({ONE}))
-    assert events(said.looked(watch, now)) == [Event.SERVER_RETURNED]
+        watch.see(now, True, frozenset({ONE}))
+    assert events(said.weigh_sight(watch, now)) == [Event.SERVER_RETURNED]
     said._goal.on(Event.SERVER_RETURNED, Now(now, now))
-    assert Event.SERVER_LOST not in events(said.looked(watch, now))
+    assert Event.SERVER_LOST not in events(said.weigh_sight(watch, now))
 
 
 def test_the_status_of_one_of_two_shows_no_end(said: replies.Replies, watch: ServerWatch) -> None:
-    assert said.shown(watch, 1.2, 5) == (Event.STATUS, 2)
-    said.looked(watch, 0.0)
-    watch.observe(1.0, True, frozenset({ONE}))
-    said.looked(watch, 1.0)
-    assert said.shown(watch, 1.2, 5) == (Event.STATUS, 2), "it may be that of the one that has gone"
+    assert said.weigh_status(watch, 1.2, 5) == (Event.STATUS, 2)
+    said.weigh_sight(watch, 0.0)
+    watch.see(1.0, True, frozenset({ONE}))
+    said.weigh_sight(watch, 1.0)
+    assert said.weigh_status(watch, 1.2, 5) == (Event.STATUS, 2), (
+        "it may be that of the one that has gone"
+    )
     said.sent_to = frozenset({ONE})
-    assert said.shown(watch, 1.2, 5) == (Event.STATUS, 5)
+    assert said.weigh_status(watch, 1.2, 5) == (Event.STATUS, 5)
 
 
 def told(said: replies.Replies, what: replies.Told, now: float) -> list[Event]:
@@ -224,8 +231,8 @@ def told(said: replies.Replies, what: replies.Told, now: float) -> list[Event]:
 def beside_a_newcomer(watch: ServerWatch) -> replies.Replies:
     """Of a goal that one server has; a second one came when it was on its way."""
     said = sent(watch)
-    watch.observe(0.0, True, BOTH)
-    told(said, said.looked(watch, 0.0), 0.0)
+    watch.see(0.0, True, BOTH)
+    told(said, said.weigh_sight(watch, 0.0), 0.0)
     return said
 
 
@@ -235,27 +242,27 @@ def test_who_was_in_sight_when_the_server_spoke_has_not_taken_its_place(
     """It was too busy to be heard, accepts, and is too busy again; the newcomer denies the goal."""
     said = beside_a_newcomer(watch)
     now = alone(watch)
-    assert told(said, said.answered("goal", watch, now, now, [True]), now) == [Event.ACCEPTED]
+    assert told(said, said.weigh_answer("goal", watch, now, now, [True]), now) == [Event.ACCEPTED]
     watch.probe_sent(now, 2)
     watch.probe_answered(now, 2)
     later = now + NO_SECOND_AFTER
-    assert said.answered("result", watch, later, now, [UNKNOWN]) is None
-    watch.observe(later, True, BOTH)
-    assert said.looked(watch, later) is None
+    assert said.weigh_answer("result", watch, later, now, [UNKNOWN]) is None
+    watch.see(later, True, BOTH)
+    assert said.weigh_sight(watch, later) is None
     assert watch.alone_since(later, now), "which would do, had it come later"
-    watch.observe(later, True, frozenset({OTHER}))
-    assert told(said, said.looked(watch, later), later) == [Event.SERVER_LOST]
+    watch.see(later, True, frozenset({OTHER}))
+    assert told(said, said.weigh_sight(watch, later), later) == [Event.SERVER_LOST]
 
 
 def test_what_a_newcomer_denies_the_server_may_still_start(watch: ServerWatch) -> None:
     said = beside_a_newcomer(watch)
     told(said, (Event.INTERRUPTED, None), 0.0)
-    assert said.answered("cancel", watch, 0.2, 0.1, [DENIED]) is None
-    assert said.looked(watch, 0.3) is None
+    assert said.weigh_answer("cancel", watch, 0.2, 0.1, [DENIED]) is None
+    assert said.weigh_sight(watch, 0.3) is None
     now = alone(watch)
     watch.probe_sent(now, 2)
     watch.probe_answered(now, 2)
-    assert said.answered("cancel", watch, now, now, [DENIED]) is None
+    assert said.weigh_answer("cancel", watch, now, now, [DENIED]) is None
     now += NO_SECOND_AFTER
-    assert told(said, said.looked(watch, now), now) == [Event.SERVER_LOST]
+    assert told(said, said.weigh_sight(watch, now), now) == [Event.SERVER_LOST]
     assert said._goal.end is End.SERVER_GONE, "and not NEVER_STARTED"

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bt_actions.utilities.shorten import given_fields, shorten, shorten_fields
+from bt_actions.utilities.shorten import MESSAGE, fit, given_fields, shorten
 
 
 class Point:
@@ -60,14 +60,10 @@ def test_a_value_is_shown_as_it_is_written_and_a_long_list_by_its_length(
     assert shorten(value) == text
 
 
-def test_the_fields_of_a_message_are_shown_without_quotes_and_cut() -> None:
-    message = Point()
-    assert shorten_fields(message) == "x 1.5, on true, data [1, 2]"
-    message.x, message.data = 0.1 + 0.2, array.array("B", [7]) * 4_000_000
-    assert shorten_fields(message) == "x 0.3, on true, data [7, 7, 7, … 4000000 items]"
-    message.x = "moving" * 1_000_000  # type: ignore[assignment]
-    assert shorten_fields(message, 12) == "x movingmov…"
-    assert shorten_fields(SimpleNamespace(no="message")) == ""
+def test_a_long_message_loses_its_middle_alone() -> None:
+    assert fit("as it is") == "as it is"
+    assert fit("a" * 50 + "b" * 50, 30) == f"{'a' * 17} … {'b' * 10}"
+    assert len(fit("x" * 1000)) == MESSAGE
 
 
 def test_the_fields_that_a_message_gives_are_those_that_a_new_one_has_not() -> None:

@@ -2,7 +2,8 @@
 
 The leaf keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
 shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
-goals/ decides what happens to the goal; here stand the visit to the leaf and its attempts.
+Here stand the visit to the leaf and its attempts. What happens to a goal is decided in goals/; how
+it goes out, and an answer comes back, is told at the head of traffic/__init__.py.
 """
 
 from __future__ import annotations
@@ -20,15 +21,15 @@ from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.messages.conversion import MessageError, fill
+from bt_actions.messages.fields import fields_in_words
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.drain import drain
 from bt_actions.utilities.places import root_of
-from bt_actions.utilities.shorten import shorten, shorten_fields
+from bt_actions.utilities.shorten import shorten
 
 if TYPE_CHECKING:
-    from bt_actions.traffic.endpoint import ActionEndpoint
-    from bt_actions.traffic.handle import GoalHandle
+    from bt_actions.traffic.state import Endpoint, GoalHandle
 
 
 _PLAIN = {bool, int, float, str}
@@ -49,7 +50,7 @@ class Progress:
     """The field of Timeouts that `seconds_left` belongs to, or ``backoff``."""
 
 
-class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
+class ActionBehaviour(Connected["Endpoint"], Behaviour):
     """Sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
 
     While it runs, `feedback_message` has the goal's state and its latest feedback in short form.
@@ -205,7 +206,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self.action_type = action
         super().setup(**kwargs)
 
-    def _make(self, backend: Backend) -> ActionEndpoint:
+    def _make(self, backend: Backend) -> Endpoint:
         return backend.traffic.endpoint(self.action_type, self.action_name)
 
     def initialise(self) -> None:
@@ -306,7 +307,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
     def explain(self, outcome: Outcome, result: Any) -> str:
         """Return what to add to the reason of a goal that has not succeeded, or nothing."""
         told = outcome is Outcome.ABORTED and result is not None
-        return f"its result is: {shorten(result)}" if told else ""
+        return f"its result is: {shorten(result, 150)}" if told else ""
 
     # Within
 
@@ -358,7 +359,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         self, handle: GoalHandle, outcome: Outcome, reason: str, backend: Backend
     ) -> AttemptRecord:
         goal, begun, ended = handle.goal, handle.begun_at.ros, backend.now().ros
-        goal.message = None  # as large as the user's data
+        goal.forget_message()
         return AttemptRecord(handle.attempt, outcome, reason, begun, ended, goal.result, goal)
 
     def _finish(self, record: AttemptRecord) -> Status:
@@ -377,7 +378,7 @@ class ActionBehaviour(Connected["ActionEndpoint"], Behaviour):
         tries = f", attempt {self.attempt} of {self.retry.attempts}" if self.attempt > 1 else ""
         feedback = handle.goal.feedback
         if feedback is not self._shown_feedback[0]:
-            told = f": {shorten_fields(feedback)}" if feedback is not None else ""
+            told = f": {fields_in_words(feedback)}" if feedback is not None else ""
             self._shown_feedback = feedback, told
         state = handle.goal.state.shown.lower().replace("_", " ")
         return f"{state}{tries}{self._shown_feedback[1]}"

@@ -17,6 +17,8 @@ from bt_actions.expressions.text import ExpressionError
 from bt_actions.goals.policy import Outcome, Timeouts
 from bt_actions.messages.conversion import to_plain
 from bt_actions.messages.interfaces import RUN_TREE
+from bt_actions.traffic.backend import Backend
+from bt_actions.traffic.state import GoalHandle
 
 CANCEL = 15.0
 """Seconds for a run to end when it is canceled: it sees its own goals to their ends first, within
@@ -78,6 +80,11 @@ class RunTree(ActionBehaviour):
         if outcome is Outcome.REJECTED:
             return "its log, and its topic ~/rejections, say why"
         return "; ".join(result.error_msg.splitlines()) if result is not None else ""
+
+    def _begin(self, backend: Backend) -> GoalHandle:
+        handle = super()._begin(backend)
+        handle.goal.untold = ("goal_name",)
+        return handle
 
     def _read_result(self, result: Any) -> str:
         if not result.settled:

@@ -14,7 +14,7 @@ from bt_actions.expressions.text import ExpressionError
 from bt_actions.messages.conversion import fill
 from bt_actions.messages.interfaces import interface
 from bt_actions.traffic.backend import Backend, Publisher, Subscription
-from bt_actions.traffic.handle import waker
+from bt_actions.traffic.state import waker
 
 LOOKS = 0.05
 """Seconds between two looks for somebody who listens, or serves: nothing announces that."""

@@ -7,7 +7,7 @@ A caller may add to `reason`. A step sends nothing: what is to be done is left i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,6 +39,9 @@ class Facts:
     message: Any = None
     """The goal message, until its leaf has the outcome: reasons tell of it, and no step depends
     on it."""
+    untold: Collection[str] = ()
+    """Its fields that say who asks, and not for what: no reason tells of them."""
+    _fields_then = ""
 
     def __init__(
         self,
@@ -132,11 +135,21 @@ class Facts:
         fields = self.fields
         return f"; goal {fields}" if fields else ""
 
+    def forget_message(self) -> None:
+        """Keep of the message, which is as large as the user's data, what may still be told."""
+        if self.state is not State.DONE:
+            self._fields_then = self.fields
+        self.message = None
+
     @property
     def fields(self) -> str:
         """The fields that the goal message gives, in short: ``{distance: 12.0}``; or ""."""
-        given = given_fields(self.message) or self.message  # one that gives none is told whole
-        text = shorten(given, FIELDS_SHOWN) if given else ""
+        if self.message is None:
+            return self._fields_then
+        given = given_fields(self.message)
+        asks = {name: given[name] for name in given if name not in self.untold}
+        told = asks or self.message  # one that gives none is told whole
+        text = shorten(told, FIELDS_SHOWN) if told else ""
         return f"{text}}}" if text.endswith("…") else text
 
     # For the steps

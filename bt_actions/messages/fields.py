@@ -13,6 +13,7 @@ from typing import Any
 
 from bt_actions.messages.interfaces import short_name
 from bt_actions.utilities.plain_data import scalar
+from bt_actions.utilities.shorten import fit
 from bt_actions.utilities.suggest import what_it_has
 
 _BITS = (8, 16, 32, 64)
@@ -91,6 +92,32 @@ def constants(cls: type) -> Mapping[str, object]:
         for name in vars(type(cls))
         if name.isupper() and not name.startswith("_") and not name.endswith("__DEFAULT")
     }
+
+
+def constant_name(message: object, field: str, value: int) -> str:
+    """Return the constant FIELD_X of the message's type that has `value`, as X; else the number."""
+    start = f"{field.upper()}_"
+    cls: type = type(message)
+    for name, known in constants(cls).items():
+        if name.startswith(start) and known == value:
+            return name.removeprefix(start)
+    return str(value)
+
+
+def fields_in_words(message: object, most: int = 4) -> str:
+    """Return the first scalar fields of a ROS message: names, values, constants by their name."""
+    parts: list[str] = []
+    for field in getattr(message, "get_fields_and_field_types", dict[str, str])():
+        value = getattr(message, field)
+        if isinstance(value, float):
+            parts.append(f"{field} {value:.2f}")
+        elif isinstance(value, str):
+            parts.append(f"{field} {fit(value, 80)}")
+        elif isinstance(value, bool):
+            parts.append(f"{field} {str(value).lower()}")
+        elif isinstance(value, int):
+            parts.append(f"{field} {constant_name(message, field, value)}")
+    return ", ".join(parts[:most])
 
 
 def _type(slot: Any) -> FieldType:

@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bt_actions.goals.ids import Author, author_of
-from bt_actions.traffic.host import Entry, Record
+from bt_actions.traffic.state import Entry, Record
 
 DIRECTORY = "BT_ACTIONS_LEDGER"
 """The environment variable that names another directory: one that outlives a container, say."""

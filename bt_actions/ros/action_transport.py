@@ -87,8 +87,8 @@ class RosTransport:
         """Whom to tell what, and when that was asked for."""
         self.reachability = Reachability()
         """Under the one lock, as all requests."""
-        self.on_trial = False
-        """The listener has another client; here it wants to hear of statuses alone."""
+        self.beside_another = False
+        """The listener has another client, and hears of feedback by that alone."""
         self.closed = False
         check_for_type_support(action_type)
         self._impl = action_type.Impl
@@ -180,7 +180,7 @@ class RosTransport:
             return
         question.answers.append(answer)
         told = kind, question.goal_id, question.asked, tuple(question.answers)
-        self._inbox.append((self._listener.answered, told, question.asked))
+        self._inbox.append((self._listener.answer_came, told, question.asked))
 
     def deliver(self) -> None:
         """Deliver what has been taken."""
@@ -189,8 +189,8 @@ class RosTransport:
             while self._inbox and not self.closed:
                 tell, what, asked = self._inbox.popleft()
                 if asked is not None:
-                    self.reachability.answered(asked=asked)
-                if self.on_trial and tell != self._listener.statuses_came:
+                    self.reachability.answer_came(asked)
+                if self.beside_another and tell == self._listener.feedback_came:
                     continue
                 try:
                     tell(*what)

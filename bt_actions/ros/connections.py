@@ -26,7 +26,7 @@ from bt_actions.messages.interfaces import TwoTypes, interface_name
 from bt_actions.ros.in_sight import mismatch, unmatched_service
 from bt_actions.ros.workarounds.closable import closable
 from bt_actions.traffic.backend import ARRIVES, Call
-from bt_actions.traffic.handle import waker
+from bt_actions.traffic.state import waker
 from bt_actions.utilities.suggest import elsewhere, listing
 
 DISCOVERS = 3.5

@@ -8,6 +8,8 @@ from __future__ import annotations
 import atexit
 import contextlib
 
+from bt_actions.goals.policy import End
+from bt_actions.goals.unaccounted import report_of
 from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 from bt_actions.ros.signals import ended_by_signals
@@ -40,8 +42,9 @@ def close_process() -> None:
             drain(host, left, lambda: hurried)
         finally:
             for handle in left:
-                if not handle.is_over:
-                    log.error(f"{handle.goal!r}: the process ends and cannot account for it")
+                is_logged = handle.end_logged is End.UNKNOWN
+                if not handle.is_over and not is_logged:
+                    log.error(report_of(handle.goal, handle.name).alarm)
             host.record.close()
             log.flush()
 

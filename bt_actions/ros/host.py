@@ -1,4 +1,4 @@
-"""The host of this process (traffic/host.py): its clock, its one lock, the log, and the alarm.
+"""The host of this process (traffic/state.py): its clock, its one lock, the log, and the alarm.
 
 The alarm is one plain thread that runs the scheduler while goals are open, ticks or not. It ends
 when none has been open for a while, and starts again with the next. Knows of no node.
@@ -12,9 +12,8 @@ import time
 from bt_actions.goals.ids import new_goal_id
 from bt_actions.ros.log import log
 from bt_actions.servers.stalls import Stalls
-from bt_actions.traffic.handle import Domain
-from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Scheduler
+from bt_actions.traffic.state import Domain, Record, Trace
 from bt_actions.utilities.plain_text import raised
 
 LINGER = 5.0

@@ -20,14 +20,17 @@ from functools import partial
 from rclpy.logging import get_logger
 
 from bt_actions.traffic.backend import LEVELS
-from bt_actions.utilities.plain_text import clean_lines
+from bt_actions.utilities.plain_text import clean, clean_lines
+from bt_actions.utilities.shorten import fit
 
 MOST = 10_000
 """Lines that wait to be written."""
 WITHIN = 1.0
 """Seconds for which `flush` waits."""
 LONGEST = 3000
-"""Bytes of a line; a pipe that has room at all has room for 4,096."""
+"""Bytes of a tree's line; a pipe that has room at all has room for 4,096."""
+LINE = 250
+"""Characters of one of ours: with what stands before it, three lines of a terminal."""
 STDERR = 2
 
 
@@ -57,9 +60,9 @@ class Log:
         self._logger.addHandler(_StandardError())
         self._logger.setLevel(logging.INFO)
         self._logger.propagate = False  # others' handlers may be added to this one
-        self.info = partial(self._put, self._logger.info)
-        self.warning = partial(self._put, self._logger.warning)
-        self.error = partial(self._put, self._logger.error)
+        self.info = lambda text: self._put(self._logger.info, clean(fit(text, LINE)))
+        self.warning = lambda text: self._put(self._logger.warning, clean(fit(text, LINE)))
+        self.error = lambda text: self._put(self._logger.error, clean(fit(text, LINE)))
         self._begin()
         atexit.register(self.flush)
         os.register_at_fork(after_in_child=self._begin)  # what waits is the parent's to write

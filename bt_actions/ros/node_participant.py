@@ -29,8 +29,9 @@ from bt_actions.ros.log import log
 from bt_actions.ros.naming import server_name, warn_of_remapping
 from bt_actions.ros.receiving import Receiver
 from bt_actions.ros.rediscovery import look_for
+from bt_actions.traffic.state import Endpoint
 from bt_actions.traffic.traffic import Traffic
-from bt_actions.traffic.transport import Listener, Seeker
+from bt_actions.traffic.transport import Listener
 from bt_actions.utilities.suggest import did_you_mean, elsewhere, listing
 
 FEEDBACK = "/_action/feedback"
@@ -125,9 +126,9 @@ class NodeParticipant:
         self._receiver.join(transport)
         return transport
 
-    def seek(self, seeker: Seeker) -> None:
-        if self._is_one_server(seeker.name):
-            look_for(seeker, self.domain, self._enclave)
+    def seek(self, endpoint: Endpoint) -> None:
+        if self._is_one_server(endpoint.name):
+            look_for(endpoint, self.domain, self._enclave)
 
     @functools.cached_property
     def _enclave(self) -> str:

@@ -7,7 +7,7 @@ made after the process is back sees it within a second (docs/reliability-setting
 
 So while a server that was in sight is wanted and is not, a new participant looks for it every now
 and then, on a thread of its own. Where a client is ready there, and ours is not, the endpoint goes
-on with that one (`Route.move_to`); a participant that finds nothing is closed. Nothing is sent
+on with that one (`watcher.move_to`); a participant that finds nothing is closed. Nothing is sent
 here, and nothing decided about goals.
 """
 
@@ -27,7 +27,9 @@ from bt_actions.ros.host import host
 from bt_actions.ros.log import log
 from bt_actions.ros.naming import own_node
 from bt_actions.ros.workarounds import participant
-from bt_actions.traffic.transport import ActionTransport, Listener, Seeker
+from bt_actions.traffic import route, watcher
+from bt_actions.traffic.state import Endpoint
+from bt_actions.traffic.transport import ActionTransport, Listener
 from bt_actions.utilities.plain_text import raised
 
 FIRST_AFTER = 1.5
@@ -79,14 +81,14 @@ class SecondParticipant:
         participant.close(self.node)
 
 
-def look_for(seeker: Seeker, domain: int, enclave: str) -> None:
-    """Look for the servers that it misses, until it misses none; the caller holds the lock.
+def look_for(endpoint: Endpoint, domain: int, enclave: str) -> None:
+    """Look for the server that it misses, until it misses none; the caller holds the lock.
 
     In the enclave of its node, which may be allowed to look where others are not.
     Whatever pause between two looks for others has been reached begins anew.
     """
     rediscovery = _by_domain.setdefault((domain, enclave), Rediscovery(domain, enclave))
-    rediscovery.add(seeker)
+    rediscovery.add(endpoint)
 
 
 class Rediscovery:
@@ -99,17 +101,17 @@ class Rediscovery:
 
     def __init__(self, domain: int, enclave: str) -> None:
         self._where = domain, enclave
-        self._missing: list[Seeker] = []
+        self._missing: list[Endpoint] = []
         self._participants: list[SecondParticipant] = []
         self._thread: threading.Thread | None = None
-        self._wanted: set[tuple[Seeker, bool]] = set()  # and whether for a goal that waits
+        self._wanted: set[tuple[Endpoint, bool]] = set()  # and whether for a goal that waits
         self._pause = FIRST_AFTER
         self._look_at = math.inf
 
-    def add(self, seeker: Seeker) -> None:
+    def add(self, endpoint: Endpoint) -> None:
         """Look for what this one misses, too."""
-        if seeker not in self._missing:
-            self._missing.append(seeker)
+        if endpoint not in self._missing:
+            self._missing.append(endpoint)
             _bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
             thread = threading.Thread(target=self._run, name="bt_actions-rediscovery", daemon=True)
@@ -146,7 +148,7 @@ class Rediscovery:
                 before, now = self._wanted, time.monotonic()
                 if not self._still_missing():
                     self._look_at = math.inf
-                self._wanted = {(seeker, seeker.has_unsent) for seeker in self._missing}
+                self._wanted = {(each, each.has_unsent) for each in self._missing}
                 if self._wanted - before:
                     self._pause = FIRST_AFTER
                     self._look_at = min(self._look_at, now + FIRST_AFTER)
@@ -159,37 +161,38 @@ class Rediscovery:
         return [each for each in self._participants if not each.users]
 
     def _still_missing(self) -> bool:
-        self._missing = [seeker for seeker in self._missing if seeker.misses()]
+        self._missing = [each for each in self._missing if route.misses(each)]
         return bool(self._missing)
 
     def _look(self) -> bool:
         """Look in a new participant; move all there for whom what they miss is ready."""
         second = SecondParticipant(*self._where)
         self._participants.append(second)
-        tried: dict[Seeker, ActionTransport] = {}
-        ready_since: dict[Seeker, float] = {}
+        tried: dict[Endpoint, ActionTransport] = {}
+        ready_since: dict[Endpoint, float] = {}
         until = time.monotonic() + LASTS
         try:
             while (now := time.monotonic()) < until:
                 with host.lock:
                     if _closing or not self._still_missing():
                         break
-                    for seeker in self._missing:
-                        if seeker not in tried and servers(second.node, seeker.name):
-                            tried[seeker] = seeker.try_in(second)
-                        if seeker in tried and tried[seeker].ready():
-                            ready_since.setdefault(seeker, now)
+                    for each in self._missing:
+                        if each not in tried and servers(second.node, each.name):
+                            tried[each] = second.open_transport(*each.action, each)
+                            route.begin_trial(each, tried[each])
+                        if each in tried and tried[each].ready():
+                            ready_since.setdefault(each, now)
                     ready = [
-                        seeker
-                        for seeker in self._missing
-                        if seeker in ready_since and seeker.try_and_compare(tried[seeker])
+                        each
+                        for each in self._missing
+                        if each in ready_since and route.is_better(each, tried[each])
                     ]
                     # Together: what one of them has lost may conflict with another's next goal.
-                    if any(now - ready_since[seeker] >= AHEAD for seeker in ready):
-                        for seeker in ready:
-                            transport = tried.pop(seeker)
+                    if any(now - ready_since[each] >= AHEAD for each in ready):
+                        for each in ready:
+                            transport = tried.pop(each)
                             second.users.add(transport)
-                            seeker.move_to(transport)
+                            watcher.move_to(each, transport)
                 time.sleep(GLANCE)
         finally:
             with host.lock:

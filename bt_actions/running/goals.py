@@ -8,25 +8,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.policy import End
 from bt_actions.goals.terms import State
-from bt_actions.traffic.handle import GoalHandle, Run, begun_in
+from bt_actions.goals.unaccounted import GoalReport, report_of
+from bt_actions.traffic.state import GoalHandle, Run, ticking_run
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True)
-class GoalReport:
-    """A goal that nobody can account for: it may still be running."""
-
-    name: str
-    server: str
-    goal_id: str
-    outcome: Outcome | None
-    reason: str
 
 
 class RunGoals:
@@ -53,11 +42,11 @@ class RunGoals:
 
     def begun_in(self, step: Callable[[], T]) -> T:
         """Return what `step` does; what it sets up and ticks is ours."""
-        before = begun_in.set(self._run)
+        before = ticking_run.set(self._run)
         try:
             return step()
         finally:
-            begun_in.reset(before)
+            ticking_run.reset(before)
 
     @property
     def not_over(self) -> list[GoalHandle]:
@@ -73,13 +62,7 @@ class RunGoals:
     def unaccounted(self) -> list[GoalReport]:
         """Those whose end is UNKNOWN, by now."""
         return [
-            GoalReport(
-                handle.name,
-                handle.goal.server,
-                handle.goal.id.hex(),
-                handle.goal.outcome,
-                f"{handle.goal.reason}{handle.goal.cancel_said}",
-            )
+            report_of(handle.goal, handle.name)
             for handle in list(self._handles)
             if handle.goal.end is End.UNKNOWN
             and (handle.goal.outcome is not None or not self.run_goes_on)
@@ -87,7 +70,7 @@ class RunGoals:
 
     def close(self, now: float) -> None:
         """Take note of nothing any more, and tell what has only now become known."""
-        self._run.tell = lambda handle: None
+        self._run.notify = lambda handle: None
         self.tell(now)
 
     def _note(self, handle: GoalHandle | None) -> None:

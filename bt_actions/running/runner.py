@@ -21,12 +21,13 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions import wiring
 from bt_actions.events import Observer
-from bt_actions.running.goals import GoalReport
+from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.running.loop import TickLoop, TreeError, check_seconds
 from bt_actions.running.threads import StartedRun, WakeUp
 from bt_actions.utilities.places import path_of, root_of
 from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.stepping import Done
+from bt_actions.utilities.suggest import listing
 
 PATIENCE_AT_EXIT = 30.0
 """Seconds that a process that ends gives a run to end: a behaviour may block its tick for ever."""
@@ -263,7 +264,7 @@ class TreeRunner:
                 f"{handle.name} on {handle.goal.server} is {handle.goal.state.shown}"
                 for handle in self._loop.goals.not_over
             ]
-            what = f"; {', '.join(goals)}" if goals else ""
+            what = f"; {listing(goals, 3)}" if goals else ""
             raise TimeoutError(f"{self.tree.root.name} is still running after {timeout:g} s{what}")
         return future.result()
 

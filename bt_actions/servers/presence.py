@@ -72,9 +72,7 @@ class ServerWatch:
         """When any word of a server came: whoever speaks is there."""
         self._most_answers = 0  # to one question
 
-    def observe(
-        self, now: float, ready: bool, gids: frozenset[GID], *, concludes: bool = True
-    ) -> None:
+    def see(self, now: float, ready: bool, gids: frozenset[GID], *, concludes: bool = True) -> None:
         """Take what discovery shows at `now` (seconds, steady clock).
 
         `concludes`: whether all answers that have come are in, so that silence means something.

@@ -45,7 +45,7 @@ class Reachability:
         """Take note of a question."""
         self._unanswered_since = min(now, self._unanswered_since)
 
-    def answered(self, asked: float) -> None:
+    def answer_came(self, asked: float) -> None:
         """Take note of an answer to a question that was asked at this moment."""
         self.heard = True
         if asked >= self._unanswered_since:

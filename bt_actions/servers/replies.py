@@ -64,7 +64,7 @@ class Replies:
         self._fresh_since = NEVER
         """Earlier questions may have been answered by a server that is gone, or had no goal yet."""
 
-    def sent(self, watch: ServerWatch) -> None:
+    def count_receivers(self, watch: ServerWatch) -> None:
         """Take note of who is shown when the request goes out, just before and just after."""
         self.sent_to |= watch.gids
         self._in_sight = watch.gids
@@ -87,17 +87,17 @@ class Replies:
 
     # Told by the servers
 
-    def answered(
+    def weigh_answer(
         self, request: str, watch: ServerWatch, now: float, asked: float, answers: Sequence[Any]
     ) -> Told:
         """Take an answer to a request: "goal", "cancel" or "result"."""
         self._note_changes(watch, now)
         if request == "goal":
-            return self._accepted(watch, now, answers)
-        take = self._canceled if request == "cancel" else self._finished
+            return self._weigh_acceptance(watch, now, answers)
+        take = self._weigh_cancel_answer if request == "cancel" else self._weigh_result
         return take(watch, now, asked, answers)
 
-    def _accepted(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
+    def _weigh_acceptance(self, watch: ServerWatch, now: float, answers: Sequence[bool]) -> Told:
         """Take an answer to the goal request: accepted or not."""
         accepted = sum(answers)
         if accepted > 1 and len(self.sent_to | watch.gids) == 1:
@@ -125,7 +125,7 @@ class Replies:
             return Event.SERVER_AMBIGUOUS, None  # by the one that is gone?
         return Event.REJECTED, None
 
-    def _canceled(
+    def _weigh_cancel_answer(
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[int]
     ) -> Told:
         """Take an answer to a cancel request, a code of action_msgs/srv/CancelGoal."""
@@ -143,7 +143,7 @@ class Replies:
                 return self._denied(now)  # maybe by a newcomer
         return Event.CANCEL_ANSWERED, CANCEL_UNKNOWN_GOAL
 
-    def _finished(
+    def _weigh_result(
         self, watch: ServerWatch, now: float, asked: float, answers: Sequence[tuple[int, Any]]
     ) -> Told:
         """Take an answer to a question for the result: status and result; status 0 is a denial."""
@@ -171,7 +171,7 @@ class Replies:
         by_all = by_each or watch.state(now) is Server.READY
         return (Event.RESULT_UNKNOWN, None) if by_all and is_fresh else None
 
-    def shown(self, watch: ServerWatch, now: float, status: int) -> Told:
+    def weigh_status(self, watch: ServerWatch, now: float, status: int) -> Told:
         """Take the status that one server publishes of the goal."""
         self.spoke(watch, now)
         self._note_changes(watch, now)
@@ -182,7 +182,7 @@ class Replies:
 
     # Told by discovery
 
-    def looked(self, watch: ServerWatch, now: float) -> Told:
+    def weigh_sight(self, watch: ServerWatch, now: float) -> Told:
         """Take what discovery shows now."""
         goal, name = self._goal, self._goal.server
         gone = watch.gone(now, self.sent_to)
@@ -245,7 +245,7 @@ class Replies:
             self._denied_at = math.inf
 
     def _denied(self, now: float) -> Told:
-        """Take note of a denial by one of several; `looked` finds out what that means."""
+        """Take note of a denial by one of several; `weigh_sight` finds out what that means."""
         self._denied_at = min(now, self._denied_at)
         return None
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
+from bt_actions.utilities.plain_text import clean
 
 SEPARATOR = " / "
 """Between the names of a path."""
@@ -107,7 +108,7 @@ def outcome_of(
     if succeeded:
         pass
     elif error is not None:
-        code, lines = Code.EXCEPTION, [str(error)]
+        code, lines = Code.EXCEPTION, [clean(str(error))]
     elif ending is not None:
         code, lines = ending.value[0], [ending.value[1]]
     else:

@@ -9,24 +9,18 @@ from bt_actions.serving.catalog import Entry
 from bt_actions.serving.outcome import Code, Ending, RunOutcome
 from bt_actions.serving.requests import Said
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import shorten
+from bt_actions.utilities.shorten import fit, shorten
 
 SAME_NAME = "SAME_NAME"
-_LONG = 60
-"""Characters of an input's value,"""
-_LONGEST = 300
-"""and of all of them."""
 _STOPPED = tuple(each.value[0] for each in Ending)
 
 
 def begins(file: str, tree: Tree, inputs: Mapping[str, object], goal_name: str) -> str:
     """Say what begins: its file, its inputs and the caller's name for it."""
     given = {each.name: each.default for each in tree.inputs.values()} | dict(inputs)
-    words = ", ".join(f"{name}={shorten(value, _LONG)}" for name, value in given.items())
-    if len(words) > _LONGEST:
-        words = f"{words[: _LONGEST - 1]}…"
+    words = ", ".join(f"{name}={shorten(value, 60)}" for name, value in given.items())
     called = f", called {goal_name!r}" if goal_name else ""
-    return clean(f"begins ({file}){' with ' if words else ''}{words}{called}")
+    return clean(f"begins ({file}){' with ' if words else ''}{fit(words, 200)}{called}")
 
 
 def ends(outcome: RunOutcome, seconds: float | None) -> str:
@@ -37,7 +31,8 @@ def ends(outcome: RunOutcome, seconds: float | None) -> str:
     elif outcome.code in _STOPPED:
         word = "STOPPED"
     after = "" if seconds is None else f" after {seconds:.2f} s"
-    return f"ends: {word}{after}{f': {outcome.message}' if outcome.message else ''}"
+    why = "; ".join(outcome.message.splitlines())
+    return f"ends: {word}{after}{f': {why}' if why else ''}"
 
 
 def warnings_of(entry: Entry) -> list[Said]:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from bt_actions.simulation.faults import Fault, FaultError, FaultKind, Value
-from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.utilities.suggest import did_you_mean, listing
 
 
 class GoalFaults:
@@ -74,8 +74,7 @@ class FaultPlan:
                 names = sorted({*known, *(name.rpartition("/")[2] for name in known)})
                 raise FaultError(
                     f"{fault}: there is no server {fault.server!r} here"
-                    f"{did_you_mean(fault.server, names) or '.'} Servers: {', '.join(known[:10])}"
-                    f"{', …' if len(known) > 10 else ''}"
+                    f"{did_you_mean(fault.server, names) or f'; there is {listing(known)}'}"
                 )
 
     def strike(self, server: str, number: int) -> GoalFaults:

@@ -111,6 +111,7 @@ KINDS: Mapping[FaultKind, Meaning] = {
     ),
 }
 
+_LISTED = "`bt-actions sim --help` lists the faults"
 _SERVER = re.compile(r"\*|/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _NUMBER = re.compile(r"[0-9]{1,9}", re.ASCII)
 _PERCENT = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)%", re.ASCII)
@@ -148,7 +149,7 @@ class Fault:
         if len(parts) != 3:
             raise FaultError(
                 f"{text!r} is not a fault: it is written SERVER:WHEN:FAULT[=VALUE], "
-                f"as in move_robot:2:abort. {listing()}"
+                f"as in move_robot:2:abort; {_LISTED}"
             )
         server, when, what = (part.strip() for part in parts)
         if not _SERVER.fullmatch(server):
@@ -187,11 +188,6 @@ class Fault:
         return server.rpartition("/")[2] == self.server
 
 
-def listing() -> str:
-    """Return all faults in one line, as they are written."""
-    return "Faults: " + ", ".join(_signature(kind) for kind in KINDS) + "."
-
-
 def table() -> str:
     """Return all faults, one a line, with what they do and their defaults."""
     rows = []
@@ -224,8 +220,8 @@ def _kind(text: str, name: str) -> FaultKind:
     try:
         return FaultKind(name.replace("-", "_").lower())
     except ValueError:
-        close = did_you_mean(name, map(str, KINDS)) or "."
-        raise FaultError(f"{text!r}: there is no fault {name!r}{close} {listing()}") from None
+        close = did_you_mean(name, map(str, KINDS)) or f"; {_LISTED}"
+        raise FaultError(f"{text!r}: there is no fault {name!r}{close}") from None
 
 
 _LEAST = {Unit.SECONDS: 0.0, Unit.FACTOR: 1.0, Unit.HERTZ: 1.0, Unit.COUNT: 1.0}

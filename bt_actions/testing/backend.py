@@ -15,7 +15,7 @@ from bt_actions.testing.host import VirtualHost
 from bt_actions.testing.network import VirtualNetwork, VirtualPublisher, told
 from bt_actions.testing.transport import VirtualParticipant
 from bt_actions.traffic.backend import ARRIVES
-from bt_actions.traffic.handle import waker
+from bt_actions.traffic.state import waker
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.utilities.suggest import elsewhere, listing
 

@@ -1,4 +1,4 @@
-"""What goals that run in virtual time have in common: the Host of traffic/host.py.
+"""What goals that run in virtual time have in common: the Host of traffic/state.py.
 
 One for each process that is played. All happens on one thread, so nothing has to be guarded; ids
 come from a seed, and a mistake of ours is raised where it happens.
@@ -12,9 +12,8 @@ from contextlib import nullcontext
 from bt_actions.servers.stalls import Stalls
 from bt_actions.testing.network import Lines
 from bt_actions.testing.timeline import Alarm, Timeline
-from bt_actions.traffic.handle import Domain
-from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Scheduled, Scheduler
+from bt_actions.traffic.state import Domain, Record, Trace
 
 
 class VirtualHost:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from bt_actions.events import Event, Observer
     from bt_actions.goals.attempts import AttemptRecord
     from bt_actions.goals.policy import Outcome
-    from bt_actions.running.goals import GoalReport
+    from bt_actions.goals.unaccounted import GoalReport
 
 LONGEST = 3600.0
 """Virtual seconds that a run may take where nothing else is said."""

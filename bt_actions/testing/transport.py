@@ -15,7 +15,8 @@ from bt_actions.messages.interfaces import interface_name
 from bt_actions.servers.presence import GID
 from bt_actions.servers.reachability import Reachability
 from bt_actions.testing.medium import Medium, Served, VirtualRequest
-from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request, Seeker
+from bt_actions.traffic.state import Endpoint
+from bt_actions.traffic.transport import GOALS_KEPT, Listener, Request
 from bt_actions.utilities.suggest import did_you_mean, elsewhere, listing
 
 LONG_AGO = float("-inf")
@@ -39,7 +40,7 @@ class VirtualTransport:
         name: str,
         listener: Listener,
     ) -> None:
-        self.on_trial = False
+        self.beside_another = False
         self.closed = False
         self.reachability = Reachability()
         self.seen_since = LONG_AGO
@@ -96,15 +97,13 @@ class VirtualTransport:
         if self.closed or not (question in self._questions or question in self._past):
             return
         tell = self._listener
-        self.reachability.answered(question.asked)
+        self.reachability.answer_came(question.asked)
         question.answers.append(answer)
-        if self.on_trial:
-            return
-        tell.answered(question.kind, question.goal_id, question.asked, tuple(question.answers))
+        tell.answer_came(question.kind, question.goal_id, question.asked, tuple(question.answers))
         tell.all_delivered()
 
     def hear_feedback(self, goal_id: bytes, feedback: Any) -> None:
-        if not (self.closed or self.on_trial):
+        if not (self.closed or self.beside_another):
             self._listener.feedback_came(goal_id, feedback)
             self._listener.all_delivered()
 
@@ -187,5 +186,5 @@ class VirtualParticipant:
         """Nothing: here nobody is another user."""
         return ""
 
-    def seek(self, seeker: Seeker) -> None:
+    def seek(self, endpoint: Endpoint) -> None:
         """Look for nothing: a second participant would see the same."""

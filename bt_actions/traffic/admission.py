@@ -8,12 +8,15 @@ from __future__ import annotations
 from bt_actions.goals.policy import Busy, Outcome
 from bt_actions.goals.terms import State
 from bt_actions.servers.presence import Server
-from bt_actions.traffic.handle import GoalHandle
-from bt_actions.traffic.watcher import BESIDE
+from bt_actions.traffic import route
+from bt_actions.traffic.state import GoalHandle
 
 IN_FLIGHT = 8
 """Goal requests of this process, of all its nodes, under way at a server; its queue holds 10, and
 drops what is over silently."""
+BESIDE = 1.0
+"""Seconds for which a server may be in sight before another one that was there all the time, or
+that came back with it; 0.5 measured."""
 
 
 def finds_server(handle: GoalHandle, now: float) -> bool:
@@ -22,7 +25,7 @@ def finds_server(handle: GoalHandle, now: float) -> bool:
     return (
         handle.goal.state is State.WAITING_FOR_SERVER
         and not endpoint.orphaned
-        and not endpoint.holds_back(now)
+        and not route.holds_back(endpoint, now)
         and endpoint.watch.state(now) is Server.READY
         and not _may_overtake(handle)
     )

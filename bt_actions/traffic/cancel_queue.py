@@ -2,60 +2,62 @@
 
 A server keeps the last ten requests of all its clients together and drops the others silently:
 sixty goals that are interrupted in one moment would run for a second more, until they are canceled
-again. So what is over waits here for an answer, or until one is not expected any more. Who
-is to be canceled, and when again, is for goals/goal.py to decide. All under the one lock.
+again. So what is over waits for an answer, or until one is not expected any more; first come first
+served, of all endpoints to the server. Who is to be canceled, and when again, is for goals/goal.py
+to decide. All under the host's lock.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from bt_actions.traffic.state import Endpoint
 
 AT_MOST = 8
 """Requests of this process without an answer at one server: two places are left to others."""
 ANSWERED_WITHIN = 1.0
 """Seconds until a request counts as lost, or its server as busy, and the next one is sent."""
 
-Send = Callable[[bytes], bool]
-"""Sends one request, and says whether it has left."""
+
+def ask_to_cancel(endpoint: Endpoint, goal_id: bytes) -> None:
+    """Ask the server to cancel a goal, as soon as its queue has room."""
+    endpoint.cancels.waiting[goal_id] = endpoint
+    send_more(endpoint, endpoint.host.steady())
 
 
-class Cancels:
-    """Whom to ask a server to cancel, of all endpoints to it, first come first served."""
+def make_room(endpoint: Endpoint, goal_id: bytes, now: float) -> None:
+    """Take note of an answer (seconds, steady clock)."""
+    endpoint.cancels.asked.pop(goal_id, None)
+    send_more(endpoint, now)
 
-    def __init__(self) -> None:
-        self._waiting: dict[bytes, Send] = {}
-        self._asked: dict[bytes, float] = {}  # when, without an answer since
 
-    def ask(self, goal_id: bytes, send: Send, now: float) -> None:
-        """Ask to cancel this goal as soon as there is room (seconds, steady clock)."""
-        self._waiting[goal_id] = send
-        self.send_more(now)
+def forget(endpoint: Endpoint, goal_id: bytes) -> None:
+    """Ask no more for this goal."""
+    endpoint.cancels.waiting.pop(goal_id, None)
+    endpoint.cancels.asked.pop(goal_id, None)
 
-    def answered(self, goal_id: bytes, now: float) -> None:
-        """Take note of an answer."""
-        self._asked.pop(goal_id, None)
-        self.send_more(now)
 
-    def forget(self, goal_id: bytes) -> None:
-        """Ask no more for this goal."""
-        self._waiting.pop(goal_id, None)
-        self._asked.pop(goal_id, None)
+def send_now(endpoint: Endpoint, goal_id: bytes) -> None:
+    """Send what waits for this goal, room or not: there may be no other time."""
+    sender = endpoint.cancels.waiting.pop(goal_id, None)
+    if sender is not None:
+        send_cancel(sender, goal_id)
 
-    def has_request(self, goal_id: bytes) -> bool:
-        """Whether a request for this goal waits for room."""
-        return goal_id in self._waiting
 
-    def send_now(self, goal_id: bytes) -> None:
-        """Send what waits for this goal, room or not: there may be no other time."""
-        send = self._waiting.pop(goal_id, None)
-        if send is not None:
-            send(goal_id)
+def send_more(endpoint: Endpoint, now: float) -> None:
+    """Send what the server has room for, of all endpoints to it (seconds, steady clock)."""
+    waiting, asked = endpoint.cancels.waiting, endpoint.cancels.asked
+    for goal_id in [each for each, at in asked.items() if now - at >= ANSWERED_WITHIN]:
+        del asked[goal_id]
+    while waiting and len(asked) < AT_MOST:
+        goal_id = next(iter(waiting))
+        if send_cancel(waiting.pop(goal_id), goal_id):
+            asked[goal_id] = now
 
-    def send_more(self, now: float) -> None:
-        """Send what there is room for."""
-        for goal_id in [each for each, at in self._asked.items() if now - at >= ANSWERED_WITHIN]:
-            del self._asked[goal_id]
-        while self._waiting and len(self._asked) < AT_MOST:
-            goal_id = next(iter(self._waiting))
-            if self._waiting.pop(goal_id)(goal_id):
-                self._asked[goal_id] = now
+
+def send_cancel(endpoint: Endpoint, goal_id: bytes) -> bool:
+    """Ask the server now; return whether the request has left."""
+    try:
+        endpoint.transport.cancel(goal_id)
+    except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
+        endpoint.warn_once("CANCEL could not be sent", error)
+        return False
+    return True

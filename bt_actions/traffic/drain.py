@@ -11,8 +11,10 @@ from collections.abc import Callable, Iterable
 
 from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.goals.terms import Event, State
-from bt_actions.traffic.handle import GoalHandle
-from bt_actions.traffic.host import Host
+from bt_actions.traffic import cancel_queue
+from bt_actions.traffic.driver import apply_deadlines, tell
+from bt_actions.traffic.route import deliver_arrived, in_doubt
+from bt_actions.traffic.state import GoalHandle, Host
 from bt_actions.utilities.stepping import Done, Sleep
 
 JUST_PAST = 0.1
@@ -58,7 +60,7 @@ class Drain:
                 if handle.goal.state is not State.DONE and not handle.endpoint.is_parents
             ]
             for handle in self._wanted:
-                handle.endpoint.tell(handle, Event.INTERRUPTED)
+                tell(handle, Event.INTERRUPTED)
             self._waits = [
                 handle
                 for handle in self._wanted
@@ -82,31 +84,31 @@ class Drain:
                 if not hurry and not self._is_over(now):
                     self._deliver_arrived()
                     for handle in self._waits:
-                        handle.endpoint.apply_deadlines(handle)
+                        apply_deadlines(handle)
                     self._waits = [handle for handle in self._waits if _may_end(handle)]
                     if self._waits:
                         return Sleep(LOOK)
                 self._gives_up_at = now + LAST_REQUESTS
-            requests = (each.endpoint.cancels.has_request(each.goal.id) for each in self._waits)
+            requests = (each.goal.id in each.endpoint.cancels.waiting for each in self._waits)
             if now < self._gives_up_at and any(requests):
                 self._deliver_arrived()
                 return Sleep(LOOK)
             for each in self._waits:  # all at once, though a server's queue drops what is too much
-                each.endpoint.cancels.send_now(each.goal.id)
+                cancel_queue.send_now(each.endpoint, each.goal.id)
             for each in self._waits:
-                each.endpoint.tell(each, Event.DRAIN_GAVE_UP)
+                tell(each, Event.DRAIN_GAVE_UP)
             return Done([each for each in self._wanted if not each.is_over])
 
     def _deliver_arrived(self) -> None:
         for endpoint in dict.fromkeys(handle.endpoint for handle in self._waits):
-            endpoint.deliver_arrived()
+            deliver_arrived(endpoint)
 
     def _is_over(self, now: float) -> bool:
         """Whether nobody waits any longer."""
         if not self._waits:
             return True
-        in_doubt = any(handle.endpoint.in_doubt(now) for handle in self._waits)
-        if in_doubt or self._host.stalls.answers_take(now):
+        doubtful = any(in_doubt(handle.endpoint, now) for handle in self._waits)
+        if doubtful or self._host.stalls.answers_take(now):
             self._not_before = now + ASK_AGAIN
         self._allow(now)
         looks_out = any(handle.looked_out_for for handle in self._waits)

@@ -1,247 +1,328 @@
-"""Tells the goals of one endpoint what happens, and does what they decide.
+"""Tells goals what happens, and does what they decide.
 
-A goal decides at once, whoever tells it something. What follows waits in one queue of its domain
-(`Effects`), so nothing is done by recursion. Only a cancel looks again at what is true by then. A
-goal request that does not leave is told to the goal. All under the host's lock.
+A goal decides at once, whoever tells it something (`tell`). What follows waits in one queue of its
+domain and is done in the order of decision (`_do_in_order`), so nothing is done by recursion. Only
+a cancel looks again at what is true by then. A goal request that does not leave is told to the
+goal. All under the host's lock.
 """
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import Busy, End, Outcome
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, Now, State
+from bt_actions.goals.unaccounted import report_of
 from bt_actions.servers.replies import Told
+from bt_actions.traffic import cancel_queue, route
 from bt_actions.traffic.admission import why_not
-from bt_actions.traffic.handle import Effect, Endpoint, GoalHandle, Standing, wake
-from bt_actions.traffic.host import Entry, Host
-from bt_actions.traffic.watcher import LOOK_WHILE_RUNNING
+from bt_actions.traffic.state import Ended, Endpoint, Entry, GoalHandle, Standing, wake
+from bt_actions.traffic.transport import GOALS_KEPT
 
-_UNANSWERED = (Outcome.ACCEPT_TIMEOUT, None)
+Effect = Callable[[GoalHandle], None]
+"""What is done for a goal."""
 
 
-class Driver:
-    """Drives the goals of one endpoint."""
+# What happens
 
-    def __init__(
-        self, endpoint: Endpoint, host: Host, failed: Callable[[str, Exception], None]
-    ) -> None:
-        """`failed` is told what could not be done, which is asked for again later."""
-        self._endpoint, self._host, self._failed = endpoint, host, failed
-        self._commands: dict[Command, Effect] = {
-            Command.RELEASE: self._release,
-            Command.SEND: self._send,
-            Command.ASK_RESULT: self._ask_result,
-            Command.CANCEL: self._cancel,
-        }
 
-    # What happens
+def tell(handle: GoalHandle, event: Event, detail: Any = None) -> None:
+    """Tell a goal what happened and do what it says."""
+    with handle.endpoint.host.lock:
+        endpoint = handle.endpoint
+        if not endpoint.is_parents:
+            _apply(handle, event, endpoint.participant.now(), detail)
 
-    def tell(self, handle: GoalHandle, event: Event, detail: Any = None) -> None:
-        """Tell a goal what happened and do what it says."""
-        with self._host.lock:
-            if not self._endpoint.is_parents:
-                self._apply(handle, event, self._endpoint.participant.now(), detail)
 
-    def pass_on(self, handle: GoalHandle, told: Told) -> None:
-        """Tell a goal what is believed of what was said of it."""
-        if told is None:
-            return
-        event, detail = told
-        if event is Event.RESULT and detail[0] != STATUS_SUCCEEDED and self._rival_sent(handle):
-            self.tell(handle, Event.REPLACED)  # this has overtaken the rival's acceptance
-        self.tell(handle, event, detail)
-        if event is Event.SERVER_AMBIGUOUS and detail is not None:  # both have told how it ended
-            self.tell(handle, Event.RESULT, detail)
+def tell_believed(handle: GoalHandle, told: Told) -> None:
+    """Tell a goal what is believed of what was said of it, or seen."""
+    if told is None:
+        return
+    event, detail = told
+    if event is Event.RESULT and detail[0] != STATUS_SUCCEEDED and _rival_sent(handle):
+        tell(handle, Event.REPLACED)  # this has overtaken the rival's acceptance
+    tell(handle, event, detail)
+    if event is Event.SERVER_AMBIGUOUS and detail is not None:  # both have told how it ended
+        tell(handle, Event.RESULT, detail)
 
-    def _rival_sent(self, handle: GoalHandle) -> bool:
-        """Whether a newer goal that replaces this one is on its way, or has arrived."""
-        holders = self._endpoint.domain.resources.holders(handle.goal.resources)
-        newer = holders[holders.index(handle) + 1 :] if handle in holders else []
-        return any(other.goal.busy is Busy.REPLACE and other.goal.sent for other in newer)
 
-    def apply_deadlines(self, handle: GoalHandle) -> None:
-        """Let the goal's deadlines take effect, unless its tree is paused before sending.
+def _rival_sent(handle: GoalHandle) -> bool:
+    """Whether a newer goal that replaces this one is on its way, or has arrived."""
+    holders = handle.endpoint.domain.resources.holders(handle.goal.resources)
+    newer = holders[holders.index(handle) + 1 :] if handle in holders else []
+    return any(other.goal.busy is Busy.REPLACE and other.goal.sent for other in newer)
 
-        What has arrived by now is taken in first: an answer that came in time is in time, though
-        the executor was too busy to look. Where this whole process stood still, it may be about to
-        arrive. One moment decides whether to do so, and what is due. What fails in it stops
-        nothing.
-        """
-        endpoint = self._endpoint
-        with self._host.lock:
-            try:
-                goal, now = handle.goal, endpoint.participant.now()
-                if endpoint.is_parents:
-                    return
-                self._give_back_time(handle, now.steady)
-                if handle.paused:
-                    return
+
+def apply_deadlines(handle: GoalHandle) -> None:
+    """Let the goal's deadlines take effect, unless its tree is paused before sending.
+
+    What has arrived by now is taken in first: an answer that came in time is in time, though the
+    executor was too busy to look. Where this whole process stood still, it may be about to arrive.
+    One moment decides whether to do so, and what is due. What fails in it stops nothing.
+    """
+    endpoint, goal = handle.endpoint, handle.goal
+    with endpoint.host.lock:
+        try:
+            now = endpoint.participant.now()
+            if endpoint.is_parents:
+                return
+            _give_back_time(handle, now.steady)
+            if handle.paused:
+                return
+            due = goal.due_in(now)
+            if due == 0.0:
+                route.deliver_arrived(endpoint)
+                now = endpoint.participant.now()
+                _suspend_after_stall(handle, now)
                 due = goal.due_in(now)
-                if due == 0.0:
-                    endpoint.deliver_arrived()
-                    now = endpoint.participant.now()
-                    self._suspend_after_stall(goal, now)
-                    due = goal.due_in(now)
-                self._host.trace.shows_time(handle)
-                for event in goal.due(now):
-                    self._apply(handle, event, now)
-                if due:
-                    self._host.scheduler.wake_by(now.steady + due)
-            except Exception as error:  # noqa: BLE001 - a mistake of ours: any
-                self._failed("a deadline could not be applied", error)
+            endpoint.host.trace.shows_time(handle)
+            for event in goal.due(now):
+                _apply(handle, event, now)
+            if due:
+                endpoint.host.scheduler.wake_by(now.steady + due)
+        except Exception as error:  # noqa: BLE001 - a mistake of ours: any
+            endpoint.warn_once("a deadline could not be applied", error)
 
-    def _give_back_time(self, handle: GoalHandle, now: float) -> None:
-        """See to it that no deadline counts the time in which a goal is not sent on our account."""
-        if handle.held_back_since is not None and not handle.goal.sent:
-            handle.goal.deadlines.postpone(now - handle.held_back_since)
-        waits = handle.goal.state is State.WAITING_FOR_SERVER
-        held_back = handle.paused or (waits and self._endpoint.holds_back(now))
-        handle.held_back_since = now if held_back else None
 
-    def _suspend_after_stall(self, goal: Goal, now: Now) -> None:
-        """Suspend deadlines that have passed while a stall may be why nothing has come in."""
-        stalls, endpoint = self._host.stalls, self._endpoint
-        waits = goal.state is State.WAITING_FOR_SERVER
-        open_question = endpoint.holds_back if waits else endpoint.in_doubt
-        in_doubt = LOOK_WHILE_RUNNING if open_question(now.steady) else 0.0
-        servers = stalls.servers_take(now.steady) if waits or goal.lost else 0.0
-        goal.deadlines.suspend(max(stalls.answers_take(now.steady), servers, in_doubt), now)
+def _give_back_time(handle: GoalHandle, now: float) -> None:
+    """See to it that no deadline counts the time in which a goal is not sent on our account."""
+    if handle.held_back_since is not None and not handle.goal.sent:
+        handle.goal.deadlines.postpone(now - handle.held_back_since)
+    waits = handle.goal.state is State.WAITING_FOR_SERVER
+    held_back = handle.paused or (waits and route.holds_back(handle.endpoint, now))
+    handle.held_back_since = now if held_back else None
 
-    def _apply(self, handle: GoalHandle, event: Event, now: Now, detail: Any = None) -> None:
-        goal, host = handle.goal, self._host
-        waited = goal.state in (State.QUEUED, State.WAITING_FOR_SERVER)
-        host.trace.tells(handle, event)
-        commands = goal.on(event, now, detail)
-        host.trace.told(handle, event, detail, commands)
-        if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
-            goal.reason += why_not(handle)
-        elif event is Event.ACCEPT_DUE and (goal.planned, goal.outcome) == _UNANSWERED:
-            goal.reason += self._endpoint.participant.unheard()
-        if (due := goal.due_in(now)) is not None:
-            host.scheduler.wake_by(now.steady + due)
-        self._endpoint.domain.effects.run(handle, self._what_follows(handle, commands))
 
-    def _what_follows(self, handle: GoalHandle, commands: Iterable[Command]) -> Iterator[Effect]:
-        """Yield what is to be done after a step of a goal, in order."""
-        before, now = handle.standing, Standing.of(handle)
-        handle.standing = now
-        if now.shown != before.shown:
-            yield self.note
-        for command in commands:
-            yield self._commands[command]
-        if now.in_the_way != before.in_the_way:
-            if not handle.goal.claims_resources and handle.goal.id in self._endpoint.goals:
-                self._endpoint.domain.left[handle] = None
-            yield self._wake_waiting
-        if (now.answered, now.state is State.LOST) != (before.answered, before.state is State.LOST):
-            yield self._update_record
-        if now.state is not before.state:
-            if now.state is State.DONE:
-                yield self._endpoint.retire
-            elif now.state is State.EXECUTING and handle.goal.busy is Busy.REPLACE:
-                yield self._replace
+def _suspend_after_stall(handle: GoalHandle, now: Now) -> None:
+    """Suspend deadlines that have passed while a stall may be why nothing has come in."""
+    goal, endpoint, stalls = handle.goal, handle.endpoint, handle.endpoint.host.stalls
+    waits = goal.state is State.WAITING_FOR_SERVER
+    doubts = route.holds_back if waits else route.in_doubt
+    in_doubt = route.LOOK_WHILE_RUNNING if doubts(endpoint, now.steady) else 0.0
+    servers = stalls.servers_take(now.steady) if waits or goal.lost else 0.0
+    goal.deadlines.suspend(max(stalls.answers_take(now.steady), servers, in_doubt), now)
 
-    # What a goal decides
 
-    def _send(self, handle: GoalHandle) -> None:
-        """Count who gets it, have it on record, and send the request."""
-        endpoint, message = self._endpoint, handle.goal.message
-        try:
-            handle.replies.sent(endpoint.watch)
-            self._put_on_record(handle)
-            endpoint.transport.send(handle.goal.id, message)
-            known = handle.replies.sent_to
-            endpoint.observe()
-            handle.replies.sent(endpoint.watch)  # who opened since got it, too
-            if handle.replies.sent_to != known:
-                self._put_on_record(handle)
-        except Exception as error:  # noqa: BLE001 - the handle's, or TypeError of a wrong message
-            self.tell(handle, Event.SEND_FAILED, error)
+def _apply(handle: GoalHandle, event: Event, now: Now, detail: Any = None) -> None:
+    """Have the goal take a step, and do what follows from it."""
+    goal, endpoint, host = handle.goal, handle.endpoint, handle.endpoint.host
+    waited = goal.state in (State.QUEUED, State.WAITING_FOR_SERVER)
+    host.trace.tells(handle, event)
+    commands = goal.on(event, now, detail)
+    host.trace.told(handle, event, detail, commands)
+    if waited and goal.outcome in (Outcome.SERVER_UNAVAILABLE, Outcome.SERVER_BUSY):
+        goal.reason += why_not(handle)
+    elif event is Event.ACCEPT_DUE and (goal.planned, goal.outcome) == (
+        Outcome.ACCEPT_TIMEOUT,
+        None,
+    ):
+        goal.reason += endpoint.participant.unheard()
+    if (due := goal.due_in(now)) is not None:
+        host.scheduler.wake_by(now.steady + due)
+    _do_in_order(handle, _what_follows(handle, commands))
 
-    def _ask_result(self, handle: GoalHandle) -> None:
-        self._ask("ASK_RESULT", self._endpoint.transport.ask_result, handle.goal.id)
 
-    def _cancel(self, handle: GoalHandle) -> None:
-        if handle.goal.state is State.DONE:  # and nothing is sent after that
-            self._send_cancel(handle.goal.id)
+def _what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[Effect]:
+    """Yield what is to be done after a step of a goal, in order."""
+    before, now = handle.standing, Standing.of(handle)
+    handle.standing = now
+    if now.shown != before.shown:
+        yield report
+    for command in commands:
+        yield _COMMANDS[command]
+    if now.in_the_way != before.in_the_way:
+        if not handle.goal.claims_resources and handle.goal.id in handle.endpoint.goals:
+            handle.endpoint.domain.left[handle] = None
+        yield _wake_waiting
+    if (now.off_record, now.state is State.LOST) != (before.off_record, before.state is State.LOST):
+        yield _update_record
+    if now.state is not before.state:
+        if now.state is State.DONE:
+            yield retire
+        elif now.state is State.EXECUTING and handle.goal.busy is Busy.REPLACE:
+            yield _replace
+
+
+def _do_in_order(handle: GoalHandle, effects: Iterable[Effect]) -> None:
+    """Do these for a goal behind what was decided before, and what is meanwhile behind these.
+
+    Where that is under way, whoever has begun it does all.
+    """
+    domain = handle.endpoint.domain
+    domain.effects.extend([(effect, handle) for effect in effects])
+    if domain.does_effects:
+        return
+    domain.does_effects = True
+    try:
+        while domain.effects:
+            effect, whose = domain.effects.popleft()
+            effect(whose)
+    finally:
+        domain.does_effects = False
+
+
+# What a goal decides
+
+
+def _release(handle: GoalHandle) -> None:
+    for next_one in handle.endpoint.domain.resources.release(handle):
+        tell(next_one, Event.GRANTED)
+
+
+def _send(handle: GoalHandle) -> None:
+    """Count who gets it, have it on record, and send the request."""
+    endpoint, goal, replies = handle.endpoint, handle.goal, handle.replies
+    try:
+        replies.count_receivers(endpoint.watch)
+        _put_on_record(handle)
+        endpoint.transport.send(goal.id, goal.message)
+        known = replies.sent_to
+        route.glance(endpoint)
+        replies.count_receivers(endpoint.watch)  # who opened since got it, too
+        if replies.sent_to != known:
+            _put_on_record(handle)
+    except Exception as error:  # noqa: BLE001 - the handle's, or TypeError of a wrong message
+        tell(handle, Event.SEND_FAILED, error)
+
+
+def _ask_result(handle: GoalHandle) -> None:
+    try:
+        handle.endpoint.transport.ask_result(handle.goal.id)
+    except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
+        handle.endpoint.warn_once("ASK_RESULT could not be sent", error)
+
+
+def _cancel(handle: GoalHandle) -> None:
+    if handle.goal.state is State.DONE:  # and nothing is sent after that
+        cancel_queue.send_cancel(handle.endpoint, handle.goal.id)
+    else:
+        cancel_queue.ask_to_cancel(handle.endpoint, handle.goal.id)
+
+
+_COMMANDS: dict[Command, Effect] = {
+    Command.RELEASE: _release,
+    Command.SEND: _send,
+    Command.ASK_RESULT: _ask_result,
+    Command.CANCEL: _cancel,
+}
+
+
+# What follows from it
+
+
+def report(handle: GoalHandle) -> None:
+    """Report a goal's change to the log, and to its run."""
+    goal, log = handle.goal, handle.endpoint.host.log
+    told, handle.end_logged = handle.end_logged, None if goal.outcome is None else goal.end
+    if handle.end_logged is End.UNKNOWN is not told:
+        if told is End.SERVER_GONE:
+            back = "its server is back; canceling it, should it still run there"
+            log.warning(f"{handle.name} on {goal.server}, goal {goal.id.hex()}: {back}")
         else:
-            self.ask_to_cancel(handle.goal.id)
+            log.error(report_of(goal, handle.name).alarm)
+    elif told is End.UNKNOWN is not handle.end_logged:
+        log.info(f"accounted for at last: {report_of(goal, handle.name)}")
+    if handle.run is not None:
+        handle.run.notify(handle)
+    handle.endpoint.host.notify_all()
 
-    def ask_to_cancel(self, goal_id: bytes) -> None:
-        """Ask the server to cancel a goal, as soon as its queue has room."""
-        self._endpoint.cancels.ask(goal_id, self._send_cancel, self._host.steady())
 
-    def _send_cancel(self, goal_id: bytes) -> bool:
-        """Ask now; return whether the request has left."""
-        return self._ask("CANCEL", self._endpoint.transport.cancel, goal_id)
+def _wake_waiting(handle: GoalHandle) -> None:
+    """Wake those of all nodes whose goals may have waited for this one.
 
-    def _ask(self, what: str, send: Callable[[bytes], None], goal_id: bytes) -> bool:
-        try:
-            send(goal_id)
-        except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
-            self._failed(f"{what} could not be sent", error)
-            return False
-        return True
+    There may be room at its server, or no conflict any more.
+    """
+    endpoint, resources = handle.endpoint, handle.goal.resources
+    unsent = endpoint.domain.unsent
+    for each in [each for each in unsent if each.goal.sent or each.goal.state is State.DONE]:
+        del unsent[each]
+    wake(e for e in unsent if e.endpoint.name == endpoint.name or e.goal.resources & resources)
 
-    def _release(self, handle: GoalHandle) -> None:
-        for next_one in self._endpoint.domain.resources.release(handle):
-            next_one.endpoint.tell(next_one, Event.GRANTED)
 
-    # What follows from it
+def _replace(handle: GoalHandle) -> None:
+    """Tell older goals on its resources that it has taken their place."""
+    for older in handle.endpoint.domain.resources.holders(handle.goal.resources):
+        if older is handle:
+            break
+        tell(older, Event.REPLACED, handle.goal.server)
 
-    def note(self, handle: GoalHandle) -> None:
-        """Report a goal's change to the log, and to its run."""
-        goal, log = handle.goal, self._host.log
-        told, handle.told = handle.told, None if goal.outcome is None else goal.end
-        if handle.told is End.UNKNOWN is not told:
-            if told is End.SERVER_GONE:
-                log.warning(
-                    f"{goal!r}: its server is back; canceling it, should it still run there"
-                )
-            else:
-                why = f"{goal.reason}{goal.cancel_said}"
-                log.error(f"{goal!r}: not accounted for, it may still be running: {why}")
-        elif told is End.UNKNOWN is not handle.told:
-            log.info(f"{goal!r}: accounted for at last")
-        if handle.begun_in is not None:
-            handle.begun_in.tell(handle)
-        self._host.notify_all()
 
-    def _wake_waiting(self, handle: GoalHandle) -> None:
-        """Wake those of all nodes whose goals may have waited for this one.
+def _update_record(handle: GoalHandle) -> None:
+    """Take it off the record, or put on it what more is known of it, if it is there."""
+    record = handle.endpoint.host.record
+    if handle.standing.off_record:
+        record.strike(handle.goal.id)
+    elif handle.goal.state is not State.DONE and handle.goal.id in record:
+        _put_on_record(handle)
 
-        There may be room at its server, or no conflict any more.
-        """
-        endpoint, resources = self._endpoint, handle.goal.resources
-        unsent = endpoint.domain.unsent
-        for each in [each for each in unsent if each.goal.sent or each.goal.state is State.DONE]:
-            del unsent[each]
-        wake(e for e in unsent if e.endpoint.name == endpoint.name or e.goal.resources & resources)
 
-    def _replace(self, handle: GoalHandle) -> None:
-        """Tell older goals on its resources that it has taken their place."""
-        for older in self._endpoint.domain.resources.holders(handle.goal.resources):
-            if older is handle:
-                break
-            older.endpoint.tell(older, Event.REPLACED, handle.goal.server)
+def _put_on_record(handle: GoalHandle) -> None:
+    goal, endpoint = handle.goal, handle.endpoint
+    servers, accept = handle.replies.sent_to, goal.timeouts.accept or 0.0
+    entry = Entry(endpoint.name, endpoint.participant.domain, servers, accept, goal.lost)
+    endpoint.host.record.enter(goal.id, entry)
 
-    def _update_record(self, handle: GoalHandle) -> None:
-        """Take it off the record, or put on it what more is known of it, if it is there."""
-        if handle.standing.answered:
-            self._host.record.strike(handle.goal.id)
-        elif handle.goal.state is not State.DONE and handle.goal.id in self._host.record:
-            self._put_on_record(handle)
 
-    def _put_on_record(self, handle: GoalHandle) -> None:
-        goal, endpoint = handle.goal, self._endpoint
-        entry = Entry(
-            endpoint.name,
-            endpoint.participant.domain,
-            handle.replies.sent_to,
-            goal.timeouts.accept or 0.0,
-            goal.lost,
-        )
-        self._host.record.enter(goal.id, entry)
+# Which goals are where
+
+
+def take_in(endpoint: Endpoint, handle: GoalHandle) -> None:
+    """Have the endpoint see to this goal from now on; it may have been another's."""
+    if handle.endpoint is not endpoint:
+        handle.endpoint = endpoint
+        handle.replies.taken_over()
+    endpoint.goals[handle.goal.id] = handle
+    if not handle.goal.claims_resources:
+        endpoint.domain.left[handle] = None
+    endpoint.domain.open[endpoint] = None
+    if not handle.goal.sent:
+        endpoint.domain.unsent[handle] = None
+    endpoint.host.scheduler.add(endpoint)
+
+
+def retire(handle: GoalHandle) -> None:
+    """Have its endpoint see to this goal no more; without any goal, to the server neither."""
+    goal, endpoint = handle.goal, handle.endpoint
+    if endpoint.goals.get(goal.id) is handle:  # and not what has turned up again
+        del endpoint.goals[goal.id]
+        endpoint.domain.left.pop(handle, None)
+        endpoint.transport.forget(goal.id)
+        if goal.end is End.UNKNOWN:
+            cancel_queue.send_now(endpoint, goal.id)  # nobody will ask again
+        cancel_queue.forget(endpoint, goal.id)
+        if goal.sent and goal.state is State.DONE:
+            _keep_ended(handle)
+    route.close_former(endpoint)
+    if not endpoint.goals:
+        endpoint.domain.open.pop(endpoint, None)
+        endpoint.host.scheduler.remove(endpoint)
+        endpoint.look_soon()  # when there is a goal again
+        close_if_unused(endpoint)
+
+
+def _keep_ended(handle: GoalHandle) -> None:
+    """Remember what endpoint.py wants to know of a goal that is DONE."""
+    goal, endpoint = handle.goal, handle.endpoint
+    endpoint.ended[goal.id] = Ended(
+        goal.timeouts, goal.resources, goal.busy,
+        None if handle.owner is None else weakref.ref(handle.owner),
+        handle.name, handle.run, handle.attempt,
+        goal.accepted, handle.replies.sent_to, endpoint.host.steady(),
+    )  # fmt: skip
+    if len(endpoint.ended) > GOALS_KEPT:
+        oldest = next(iter(endpoint.ended))
+        del endpoint.ended[oldest]
+        endpoint.transport.forget(oldest)
+
+
+def close_if_unused(endpoint: Endpoint) -> None:
+    """Close the transport of an endpoint that has no user and no open goal.
+
+    Not before it has delivered all: a second server may have taken the last goal, too.
+    """
+    unused = endpoint.users <= 0 and not endpoint.goals and not endpoint.transport.has_more
+    if unused and endpoint.of_node.get(endpoint.name) is endpoint:
+        del endpoint.of_node[endpoint.name]
+        endpoint.transport.close()

@@ -1,17 +1,17 @@
 """Hands goals that were lost, or left, from one endpoint to another of the same action.
 
-Each node discovers for itself; so a goal whose server has gone for one node is seen to by whichever
-node of this process sees that server again, and is canceled first. Whether a
-server is there is for servers/ to say. All under the host's lock.
+Each node discovers for itself. So where a goal's server has gone for one node, whichever node of
+this process sees that server again sees to the goal, and cancels it first. All under the host's
+lock.
 """
 
 from __future__ import annotations
 
 from bt_actions.goals.terms import NEVER, Event
 from bt_actions.servers.presence import LEASE, Server
-from bt_actions.traffic.handle import Endpoint
-from bt_actions.traffic.host import Host
+from bt_actions.traffic.driver import retire, take_in, tell
 from bt_actions.traffic.route import TOO_NEW
+from bt_actions.traffic.state import Endpoint
 
 LOST_KEPT = 100
 """Goals of one action remembered in case their server, or their request, turns up: the newest."""
@@ -34,19 +34,19 @@ def take_over(endpoint: Endpoint, now: float) -> None:
             continue
         taken_for_dead = watch.all_live(now) and not other.watch.all_live(now)
         if other.orphaned or other.watch.gone(now, servers) or taken_for_dead:
-            endpoint.take_in(handle)
-            other.retire(handle)
+            retire(handle)
+            take_in(endpoint, handle)
 
 
-def adopt(endpoint: Endpoint, host: Host) -> None:
+def adopt(endpoint: Endpoint) -> None:
     """Take over what was lost, or left, at this action before, to cancel it first."""
     for handle in endpoint.domain.lost.pop(endpoint.action, []):
         saw_it = endpoint.participant.seen_since + TOO_NEW < handle.begun_at.steady
         if handle.endpoint.participant is not endpoint.participant and not saw_it:
             # A later node need only have discovered
-            until = host.steady() + (LEASE if handle.not_gone_before == NEVER else TOO_NEW)
+            until = endpoint.host.steady() + (LEASE if handle.not_gone_before == NEVER else TOO_NEW)
             handle.not_gone_before = max(handle.not_gone_before, until)
-        endpoint.take_in(handle)
+        take_in(endpoint, handle)
 
 
 def park(endpoint: Endpoint, *, all_of_them: bool = False) -> None:
@@ -54,16 +54,16 @@ def park(endpoint: Endpoint, *, all_of_them: bool = False) -> None:
     for handle in endpoint.handles:
         goal = handle.goal
         if all_of_them or (goal.outcome is not None and not goal.claims_resources):
-            endpoint.tell(handle, Event.PARKED)
+            tell(handle, Event.PARKED)
         if goal.lost:
             goal.deadlines.clear()  # nobody looks out for its server from now on
             endpoint.domain.lost[endpoint.action].append(handle)
-            endpoint.retire(handle)
+            retire(handle)
 
 
-def bound_the_lost(endpoint: Endpoint, host: Host) -> None:
+def bound_the_lost(endpoint: Endpoint) -> None:
     """Give up the oldest of too many lost goals; none that its server may still decide on."""
     forgettable = [handle for handle in endpoint.handles if handle.accounted_for]
     for handle in forgettable[:-LOST_KEPT]:
-        endpoint.tell(handle, Event.ABANDONED)
-        host.record.strike(handle.goal.id)
+        tell(handle, Event.ABANDONED)
+        endpoint.host.record.strike(handle.goal.id)

@@ -20,12 +20,11 @@ from bt_actions.goals.policy import Busy, Timeouts
 from bt_actions.goals.terms import Event, Now, State
 from bt_actions.messages.interfaces import TwoTypes, interface_name
 from bt_actions.servers.presence import Server
-from bt_actions.traffic import admission, handover
+from bt_actions.traffic import admission, handover, watcher
 from bt_actions.traffic.drain import drain
+from bt_actions.traffic.driver import apply_deadlines, close_if_unused, report, take_in, tell
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import Action, Endpoint, GoalHandle, begun_in
-from bt_actions.traffic.host import Host
-from bt_actions.traffic.transport import Participant
+from bt_actions.traffic.state import Action, Endpoint, GoalHandle, Host, Participant, ticking_run
 from bt_actions.utilities.plain_text import in_words
 
 
@@ -37,9 +36,9 @@ class Traffic:
         self.closed = False
         """Whether it was destroyed; whoever sets up a tree needs another one."""
         self._domain = host.domain(participant.domain)
-        self._endpoints: dict[str, ActionEndpoint] = {}
+        self._endpoints: dict[str, Endpoint] = {}
 
-    def endpoint(self, action_type: Any, action_name: str) -> ActionEndpoint:
+    def endpoint(self, action_type: Any, action_name: str) -> Endpoint:
         """Return the shared endpoint to an action, and count its user.
 
         A remapping rule for the action's name has no effect, and is warned of. Raises ValueError
@@ -53,40 +52,30 @@ class Traffic:
             elif endpoint.action[0] is not action_type:
                 raise TwoTypes(name, action_type, [interface_name(endpoint.action[0])])
             endpoint.users += 1
-            endpoint.watcher.look_early(self.host.steady())
+            watcher.look_early(endpoint, self.host.steady())
             return endpoint
 
-    def _open_to(self, action: Action) -> ActionEndpoint:
+    def _open_to(self, action: Action) -> Endpoint:
         """Return a new endpoint to an action, with no user yet."""
         endpoint = self._endpoints[action[1]] = ActionEndpoint(
-            self.host, self.participant, self.drop_if_unused, action
+            self.host, self.participant, self._endpoints, action
         )
-        handover.adopt(endpoint, self.host)
+        handover.adopt(endpoint)
         return endpoint
 
-    def leave(self, endpoint: ActionEndpoint) -> None:
+    def leave(self, endpoint: Endpoint) -> None:
         """Count a user of `endpoint` off; with the last one, and no goal open, it goes."""
         with self.host.lock:
             endpoint.users -= 1
             if endpoint.users <= 0:
                 handover.park(endpoint)
-            self.drop_if_unused(endpoint)
-
-    def drop_if_unused(self, endpoint: Endpoint) -> None:
-        """Close the transport of an endpoint that has no user and no open goal.
-
-        Not before it has delivered all: a second server may have taken the last goal, too.
-        """
-        unused = endpoint.users <= 0 and not endpoint.goals and not endpoint.transport.has_more
-        if unused and self._endpoints.get(endpoint.name) is endpoint:
-            del self._endpoints[endpoint.name]
-            endpoint.transport.close()
+            close_if_unused(endpoint)
 
     # A leaf's calls
 
     def begin(
         self,
-        endpoint: ActionEndpoint,
+        endpoint: Endpoint,
         owner: Any,
         timeouts: Timeouts,
         resources: frozenset[str],
@@ -110,14 +99,14 @@ class Traffic:
                 busy=busy, accounts_for_all=accounts_for_all,
             )  # fmt: skip
             handle = GoalHandle(
-                goal, endpoint, owner, owner.name, begun_in.get(), attempt, keeps_feedback, now
+                goal, endpoint, owner, owner.name, ticking_run.get(), attempt, keeps_feedback, now
             )
-            endpoint.take_in(handle)
+            take_in(endpoint, handle)
             answer = self._domain.resources.request(handle, goal.resources, busy)
             if answer is None:
-                endpoint.driver.note(handle)
+                report(handle)
             else:
-                endpoint.tell(handle, answer)
+                tell(handle, answer)
             return handle
 
     def _full_name(self, name: str) -> str:
@@ -142,7 +131,7 @@ class Traffic:
         called without the lock (the server may go meanwhile), unless `is_plain` says that it runs
         no code of the user's.
         """
-        endpoint, handle.begun_in = handle.endpoint, begun_in.get() or handle.begun_in
+        endpoint, handle.run = handle.endpoint, ticking_run.get() or handle.run
         if handle.goal.state is State.DONE:
             return
         at_once = handle.goal.state is State.WAITING_FOR_SERVER and is_plain()
@@ -153,24 +142,24 @@ class Traffic:
                 message = make_message()
             except Exception as error:  # noqa: BLE001 - the user's: any
                 # in_words may run code of the user's: before `tell` takes the lock
-                endpoint.tell(handle, Event.INVALID, in_words(error))
+                tell(handle, Event.INVALID, in_words(error))
                 return
             with self.host.lock:
                 if at_once or (endpoint.participant.alive() and self._may_send(handle)):
                     handle.goal.message = message
-                    endpoint.tell(handle, Event.SERVER_READY)
+                    tell(handle, Event.SERVER_READY)
 
     def _is_due(self, handle: GoalHandle) -> bool:
         """Apply what is due, look at the server, and say whether to send the goal now."""
         endpoint = handle.endpoint
         with self.host.lock:
-            endpoint.apply_deadlines(handle)
+            apply_deadlines(handle)
             if self.host.closing:
-                endpoint.tell(handle, Event.INTERRUPTED)
+                tell(handle, Event.INTERRUPTED)
             if handle.goal.state is not State.WAITING_FOR_SERVER:
                 return False
-            if endpoint.recent_state(self.host.steady()) is Server.AMBIGUOUS:
-                endpoint.tell(handle, Event.SERVER_AMBIGUOUS)
+            if watcher.recent_state(endpoint, self.host.steady()) is Server.AMBIGUOUS:
+                tell(handle, Event.SERVER_AMBIGUOUS)
             return self._may_send(handle)
 
     def _may_send(self, handle: GoalHandle) -> bool:
@@ -200,7 +189,7 @@ class Traffic:
             if ours is not None and ours.action == action:
                 to_see[ours] = None
         for endpoint in to_see:  # all of them first: one may see what another has lost
-            endpoint.observe_and_tell(now)
+            watcher.look(endpoint, now)
 
     def deadline(self, handle: GoalHandle, now: Now) -> tuple[Event, float] | None:
         """Its next deadline, and the seconds until then; these change with what arrives."""
@@ -209,14 +198,14 @@ class Traffic:
 
     def interrupt(self, handle: GoalHandle) -> None:
         """The tree no longer wants it. Returns at once; the goal is drained."""
-        handle.endpoint.tell(handle, Event.INTERRUPTED)
+        tell(handle, Event.INTERRUPTED)
 
     def pause(self, handles: Iterable[GoalHandle], wanted: bool) -> None:
         """Stop the deadlines of goals that were not sent yet, or let them run on."""
         with self.host.lock:
             for handle in handles:
                 handle.paused = wanted and not handle.goal.sent
-                handle.endpoint.apply_deadlines(handle)
+                apply_deadlines(handle)
 
     def destroy(self, hurry: Callable[[], bool] = lambda: False) -> None:
         """Drain what is still open and close the transports; nobody may spin the node any more."""
@@ -228,6 +217,6 @@ class Traffic:
             for endpoint in list(self._endpoints.values()):
                 handover.park(endpoint, all_of_them=True)
                 for handle in endpoint.handles:
-                    endpoint.tell(handle, Event.ABANDONED)
+                    tell(handle, Event.ABANDONED)
                 endpoint.transport.close()
             self._endpoints.clear()

@@ -1,4 +1,4 @@
-"""The seam to what carries messages: one action as one participant sees it, and the participant.
+"""The seam to what carries messages: one action as one participant sees it, and who listens.
 
 `ros/` implements these protocols with rclpy, `testing/` on a network in virtual time. Both sides of
 the seam keep one contract (tests/traffic/test_transport.py). All of it is called under the host's
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import Any, Literal, Protocol
 
-from bt_actions.goals.terms import Now
 from bt_actions.servers.presence import GID
 from bt_actions.servers.reachability import Reachability
 
@@ -25,7 +24,7 @@ def nobodys(probe: int) -> bytes:
     return b"bt_probe" + probe.to_bytes(8, "big")
 
 
-def probe(transport: ActionTransport, number: int, now: float) -> None:
+def send_probe(transport: ActionTransport, number: int, now: float) -> None:
     """Ask for a goal that nobody knows: each live server answers at once, with status 0."""
     transport.ask_result(nobodys(number))
     transport.reachability.asked(now)
@@ -34,7 +33,7 @@ def probe(transport: ActionTransport, number: int, now: float) -> None:
 class Listener(Protocol):
     """Who is told what the servers say: under the host's lock, from whichever thread delivers."""
 
-    def answered(
+    def answer_came(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
         """A server answered a request that was sent at `asked` (seconds, steady clock).
@@ -62,8 +61,8 @@ class ActionTransport(Protocol):
     """
 
     closed: bool
-    on_trial: bool
-    """The listener has another transport; of this one it wants to hear of statuses alone."""
+    beside_another: bool
+    """The listener has another transport, and hears of feedback by that alone."""
 
     seen_since: float
     """Since when its participant sees others (seconds, steady clock)."""
@@ -107,83 +106,3 @@ class ActionTransport(Protocol):
 
     def close(self) -> None:
         """Send and deliver nothing any more; what is still under way is lost. Twice: fine."""
-
-
-class Seeker(Protocol):
-    """Who has lost sight of a server, or is not heard by it any more (route.py)."""
-
-    name: str
-    """The full name of the action."""
-
-    def misses(self) -> bool:
-        """Whether a server is wanted, and is not in sight, or does not answer, by now."""
-
-    @property
-    def has_unsent(self) -> bool:
-        """Whether a goal is still to be sent."""
-
-    def try_in(self, participant: Opener) -> ActionTransport:
-        """Open a transport like its own in another participant, on trial."""
-
-    def try_and_compare(self, transport: ActionTransport) -> bool:
-        """Ask in this one, which is ready; whether it is heard, or sees, what its own does not.
-
-        Called again and again until an answer has had time to come.
-        """
-
-    def move_to(self, transport: ActionTransport) -> None:
-        """Use this one from now on, or close it."""
-
-
-class Opener(Protocol):
-    """What a new participant can do that was made for a Seeker."""
-
-    def open_transport(self, action_type: Any, name: str, listener: Listener) -> ActionTransport:
-        """Open one; raises what the middleware raises for a wrong name or type."""
-
-
-class Participant(Opener, Protocol):
-    """A participant of the ROS network: what it sees and hears, the goals of its node do."""
-
-    domain: int
-    """The ROS domain id."""
-
-    name: str
-    """The name of the node."""
-
-    namespace: str
-    """The namespace of the node: "/" or "/r1"."""
-
-    seen_since: float
-    """Since when it sees others (seconds, steady clock).
-
-    A new one has dropped no server yet: what it does not see it may still discover.
-    """
-
-    long_stalls: int
-    """How often the process had stood still for long by `seen_since` (Stalls.long_times)."""
-
-    def now(self) -> Now:
-        """Return this moment, by the steady clock and by its own."""
-
-    def alive(self) -> bool:
-        """Whether it is there, and can send and hear."""
-
-    def shut_down(self) -> bool:
-        """Whether all of ROS was shut down here, as by Ctrl-C; else one that is not alive has gone
-        from under its goals."""
-
-    def full_name(self, action: str) -> str:
-        """Return the full name of an action; raises ValueError for one that ROS refuses."""
-
-    def instead(self, action_type: Any, name: str) -> str:
-        """Say, as the end of a sentence, what is in sight where this action is not; or ""."""
-
-    def unheard(self) -> str:
-        """Say, as the end of a sentence, what may keep a server in sight from answering; or ""."""
-
-    def seek(self, seeker: Seeker) -> None:
-        """Have another participant look for what is missed, soon.
-
-        Does nothing where there can be no other, or where it would find another server than ours.
-        """

@@ -9,6 +9,9 @@ from collections.abc import Iterator, Mapping
 
 from bt_actions.utilities.plain_data import field_of, item_of, scalar
 
+MESSAGE = 300
+"""Characters of a message: three lines of a terminal."""
+
 _ALL = 20
 """A list with more items is shown by its first ones and their number."""
 _FIRST = 3
@@ -17,7 +20,7 @@ Part = tuple[str, object]
 """A text, and a value that stands behind it (or `_NOTHING`)."""
 
 
-def shorten(value: object, limit: int = 300) -> str:
+def shorten(value: object, limit: int = MESSAGE) -> str:
     """Return a value as people write it in a tree: ``{x: 1.0, on: true, name: 'a'}``.
 
     A long list is ``[7, 7, 7, … 4000000 items]``; a text of more than `limit` characters is cut,
@@ -48,21 +51,12 @@ def shorten(value: object, limit: int = 300) -> str:
     return text if len(text) <= limit else f"{text[: limit - 1]}…"
 
 
-def shorten_fields(message: object, limit: int = 80) -> str:
-    """Return the fields of a ROS message as ``remaining 1.2, phase moving``, cut as `shorten` does.
-
-    A field's own value is cut at half of the limit; a number has six digits.
-    """
-    text = ""
-    types = getattr(message, "get_fields_and_field_types", dict[str, str])()
-    for name in types:
-        value = field_of(message, name, types)
-        plain = value[:limit] if isinstance(value, str) else ""
-        number = f"{value:g}" if isinstance(value, float) else ""
-        text += f"{', ' if text else ''}{name} {plain or number or shorten(value, limit // 2)}"
-        if len(text) > limit:
-            return f"{text[: limit - 1]}…"
-    return text
+def fit(text: str, limit: int = MESSAGE) -> str:
+    """Return a message as it is, or without its middle: its end often says what to do."""
+    if len(text) <= limit:
+        return text
+    tail = limit // 3
+    return f"{text[: limit - tail - 3]} … {text[-tail:]}"
 
 
 def given_fields(message: object) -> dict[str, object]:

@@ -12,6 +12,7 @@ from bt_actions import cli
 from bt_actions.cli.arguments.values import goal_fields, nested, value
 from bt_actions.cli.exits import BadInput
 from bt_actions.cli.program import COMMANDS
+from bt_actions.utilities.shorten import MESSAGE
 
 CHECKOUT = Path(__file__).parents[2]
 
@@ -93,6 +94,53 @@ def test_a_wrong_argument_is_refused_on_one_line_that_says_what_is_meant(
     arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert message in refused(capsys, *arguments)
+
+
+LONG = "x" * 3000
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [LONG],
+        *([command, f"--{LONG}"] for command in COMMANDS),
+        *(
+            ["run", "pick_and_place", *words]
+            for words in (
+                ["--set", f"{LONG}=1"],
+                ["--set", f"pick_at={LONG}"],
+                ["--timeout", LONG],
+                ["--executor", LONG],
+                ["--sim", "--fault", LONG],
+                ["--sim", "--fault", f"move_robot:{LONG}:abort"],
+                ["--sim", "--fault", f"move_robot:1:{LONG}"],
+                ["--sim", "--fault", f"move_robot:1:abort={LONG}"],
+                ["--ros-args", "-p", f"{LONG}:=1"],
+                ["--ros-args", LONG],
+            )
+        ),
+        ["send", LONG, "MoveRobot"],
+        ["send", "a", LONG],
+        ["send", "a", "MoveRobot", f"{LONG}=1"],
+        ["send", "a", "MoveRobot", f"distance={LONG}"],
+        ["call", "a", "--set", LONG],
+        ["control", LONG, "pause"],
+        ["control", "a", "pause", LONG],
+        ["cleanup", LONG],
+        ["serve", "--policy", LONG],
+        ["serve", "--trees", LONG],
+        ["sim", "--journal", f"/{LONG}"],
+        ["explain", LONG],
+        ["interfaces", "build", LONG],
+        ["render", "pick_and_place", "-o", f"/{LONG}.svg"],
+        ["completion", LONG],
+    ],
+    ids=lambda arguments: " ".join(word[:20] for word in arguments),
+)
+def test_a_wrong_argument_of_any_length_is_refused_in_three_lines_at_most(
+    arguments: list[str], domain: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert len(refused(capsys, *arguments)) <= MESSAGE + 1
 
 
 def test_without_arguments_the_help_is_shown(capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,7 +21,7 @@ from bt_actions.cli.views.lines import LineView
 from bt_actions.cli.views.words import Closing
 from bt_actions.events import Event
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.goals import GoalReport
+from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.running.report import Report
 from tests.cli.fakes import FakeAction, FakeRunner, Story
 from tests.support.waiting import until
@@ -246,7 +246,7 @@ def test_a_second_signal_ends_the_wait_at_once_and_the_report_says_what_is_left(
     assert (ended.code, ended.abandoned) == (Exit.UNKNOWN, True)
     assert run.out.getvalue().splitlines()[-2:] == [
         "not accounted for: Move on /move_robot, goal 0123456789abcdef: silent",
-        "not accounted for: Move on move_robot, goal Move-1-1, executing when left",
+        "not accounted for: Move on move_robot, goal Move-1-1: executing when left",
     ]
     assert "  CANCELED, end UNKNOWN  " in run.out.getvalue()
 

@@ -130,7 +130,10 @@ def test_a_goal_whose_end_stays_unknown_makes_the_code_3(
     host.send(signal.SIGSTOP)
     run.send(signal.SIGTERM)
     assert run.wait() == 3, run
-    assert f"not accounted for: To the part on {namespace}/move_robot" in run.lines[-1]
+    [told] = [line for line in (*run.lines, *run.errors) if "not accounted for" in line]
+    assert told.startswith(f"not accounted for: To the part on {namespace}/move_robot, goal ")
+    assert "{distance: " in told
+    assert f"`bt-actions cleanup {namespace}/move_robot` cancels it" in str(run)
 
 
 def test_a_closed_standard_output_ends_the_run_as_sigterm_does_though_nothing_more_is_written(

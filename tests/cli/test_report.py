@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import io
 import weakref
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,8 +17,9 @@ from py_trees.composites import Selector, Sequence
 from py_trees.decorators import Inverter
 
 from bt_actions.cli.exits import Exit
+from bt_actions.cli.views.lines import LineView
 from bt_actions.cli.views.table import summary, table, verdict
-from bt_actions.cli.views.words import Closing, goal_text, last_words
+from bt_actions.cli.views.words import Closing, goal_text, last_words, troubles
 from bt_actions.document import Place, load_tree
 from bt_actions.document.findings import NODE
 from bt_actions.events import Event, TreeFinished
@@ -25,6 +27,7 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
 from bt_actions.running.ticking import ChangeVisitor
 from bt_actions.testing import VirtualRunner
+from bt_actions.utilities.shorten import MESSAGE
 from tests.cli.fakes import FakeAction, Story
 
 
@@ -249,6 +252,24 @@ def test_the_summary_names_path_attempts_outcome_reason_and_place(story: Story) 
         "  ABORTED after 2 attempts: a fault",
         "  trees/x.yaml:14:9",
     ]
+
+
+def test_reasons_of_any_length_leave_the_end_of_a_run_with_lines_that_can_be_read(
+    story: Story,
+) -> None:
+    leaf, reason = FakeAction("n" * 400, server=f"/{'s' * 200}"), "the motor\nis hot; " * 300
+    report = told(leaf, *fail(story, leaf, reason), story.finish(Status.FAILURE))
+    report.unaccounted = [f"Move on /move_robot, goal 01: {reason}"] * 2
+    closing = Closing(Exit.FAILURE, error=reason)
+    said = troubles(report, closing)
+    assert all(len(line) <= MESSAGE and "\n" not in line for line in said)
+    assert report.culprits()[0].row.reason == reason  # type: ignore[union-attr]
+    out = io.StringIO()
+    view = LineView(report, out)
+    for event in fail(story, leaf, reason):
+        view.event(event)
+    view.finish(closing)
+    assert all(len(line) <= MESSAGE for line in out.getvalue().splitlines())
 
 
 def test_of_a_fallback_each_child_that_failed_is_named_and_of_a_sequence_only_the_one(

@@ -24,11 +24,12 @@ from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.lines import LineView
 from bt_actions.cli.views.live import SCROLLS, LiveView, suits
 from bt_actions.cli.views.view import View
-from bt_actions.cli.views.words import Closing, fields_text, last_words, result_lines
+from bt_actions.cli.views.words import Closing, last_words, result_lines
 from bt_actions.document import load_tree
 from bt_actions.document.findings import LOADED
 from bt_actions.events import Event, TreeFinished
 from bt_actions.goals.policy import End, Outcome
+from bt_actions.messages.fields import fields_in_words
 from bt_actions.running.report import Report
 from tests.cli.fakes import FakeAction, FakeProgress, Story
 
@@ -547,8 +548,8 @@ def test_a_message_in_words_shows_constants_by_name() -> None:
     from robot_control_interfaces.action import Gripper, MoveRobot
 
     result = MoveRobot.Result(final_pose=2.0, status=MoveRobot.Result.STATUS_FAULT, message="hot")
-    assert fields_text(result) == "final_pose 2.00, status FAULT, message hot"
-    assert fields_text(Gripper.Feedback(stalled=True)).startswith("position 0.00, stalled true")
+    assert fields_in_words(result) == "final_pose 2.00, status FAULT, message hot"
+    assert fields_in_words(Gripper.Feedback(stalled=True)).startswith("position 0.00, stalled true")
     assert "  status: 3  # FAULT" in result_lines(result)
 
 
@@ -569,14 +570,14 @@ def test_reports_and_the_live_view_shorten_long_values_and_json_has_them_whole(
     report.observe(story.finish(Status.SUCCESS))
     assert last_words(report, Closing(Exit.SUCCESS))[1:3] == [
         "many: [7, 7, 7, … 1000000 items]",
-        f"text: {'x' * 299}…",
+        f"text: {'x' * 131} … {'x' * 66}",
     ]
     *_, finished = objects_of(root, [story.start()])
     assert finished["outputs"] == {"many": LARGE, "text": "x" * 1_000_000}
     result = result_lines(Fibonacci.Result(sequence=LARGE))
     assert result == ["  sequence:", "  - 7", "  - 7", "  - 7", "  - … 1000000 items"]
     result = MoveRobot.Result(message="x" * 1_000_000)
-    assert fields_text(result).endswith(f", message {'x' * 299}…")
+    assert fields_in_words(result).endswith(f", message {'x' * 51} … {'x' * 26}")
 
 
 def test_without_a_result_there_are_no_lines() -> None:

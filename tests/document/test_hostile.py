@@ -26,6 +26,7 @@ from bt_actions.document import (
 from bt_actions.document.reading.inputs import parse_input
 from bt_actions.document.reading.workspace import MAX_LEVELS
 from bt_actions.document.yaml.source import MAX_BYTES, MAX_ERRORS
+from bt_actions.utilities.shorten import MESSAGE
 from tests.document.test_wrong_documents import CASES
 
 EMPTY = '""'
@@ -41,6 +42,30 @@ def check_bytes(data: bytes) -> list[Finding]:
 def only(findings: list[Finding]) -> str:
     (finding,) = findings
     return finding.headline()
+
+
+LONG = "n" * 3000
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"tree: {LONG} {LONG}\nroot: {{success: }}\n",
+        f"tree: t\nroot: {{{LONG}: x}}\n",
+        f"tree: t\ninputs: {{{LONG}: bogus}}\nroot: {{check: ${LONG} > 1}}\n",
+        f"tree: t\nroot: {{python: {LONG}.{LONG}, name: x}}\n",
+        f"tree: t\nroot: {{subtree: {LONG}.yaml}}\n",
+        f"tree: t\nimport: [{LONG}.yaml]\nroot: {{wait: {LONG}}}\n",
+        f"tree: t\nactions: {{a: {{type: pkg/action/{LONG}, server: '{LONG} {LONG}'}}}}\n",
+        f"tree: t\ninputs: {{{', '.join(f'{LONG[:60]}{n}: int32' for n in range(200))}}}\n",
+        f"tree: t\nroot: {{check: $nope, goal: {{{LONG}: 1}}, retry: {LONG}}}\n",
+    ],
+)
+def test_names_of_any_length_leave_what_is_said_of_them_three_lines_long(text: str) -> None:
+    findings = check_bytes(text.encode())
+    assert findings
+    for line in "\n".join(map(str, findings)).splitlines():
+        assert len(line) <= MESSAGE + len("  hint: "), line
 
 
 def test_a_directory_is_no_tree(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ import pytest
 
 from bt_actions.document import Finding, check_source, source_of
 from bt_actions.document.findings.rules import RULES
+from bt_actions.utilities.shorten import MESSAGE
 
 TABLE = Path(__file__).with_name("wrong_documents.txt")
 
@@ -66,6 +67,12 @@ CASES = read_table()
 def test_a_wrong_document_is_answered_with_the_exact_place_and_words(case: Case) -> None:
     assert case.expected, "run this file as a script to fill the table in"
     assert findings_of(case.text) == case.expected
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.title)
+def test_what_is_said_of_a_mistake_is_three_lines_at_most(case: Case) -> None:
+    for told in "\n".join(case.expected).split(">> ")[1:]:
+        assert len(told) <= MESSAGE, told
 
 
 def test_the_table_holds_at_least_eighty_documents_each_under_its_own_title() -> None:

@@ -15,7 +15,7 @@ from bt_actions.goals.terms import State
 from bt_actions.servers.replies import Replies
 
 if TYPE_CHECKING:
-    from bt_actions.traffic import handle as traffic
+    from bt_actions.traffic import state as traffic
     from tests.machine.world import Job
 
 

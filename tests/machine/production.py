@@ -1,6 +1,6 @@
 """Leaves, and the production traffic beneath them, in a model world.
 
-A model is what lies around it, as traffic/transport.py and traffic/host.py have it: transports,
+A model is what lies around it, as traffic/transport.py and traffic/state.py have it: transports,
 participants and the host. Of traffic/ itself nothing is copied, and nothing replaced. Each step of
 a goal is shown to the judge, by the host's trace.
 """
@@ -19,11 +19,12 @@ from bt_actions.goals.resources import Resources
 from bt_actions.goals.terms import Command, Event, Now, State
 from bt_actions.servers.reachability import Reachability
 from bt_actions.servers.stalls import IN_A_ROW, Stalls
-from bt_actions.traffic import handle as traffic
+from bt_actions.traffic import state as traffic
+from bt_actions.traffic import watcher
+from bt_actions.traffic.driver import apply_deadlines, tell
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import Domain
-from bt_actions.traffic.host import Record, Trace
 from bt_actions.traffic.scheduler import Scheduler
+from bt_actions.traffic.state import Domain, Record, Trace
 from bt_actions.traffic.traffic import Traffic
 from bt_actions.traffic.transport import GOALS_KEPT, Listener
 from tests.machine.judge import Judge, Violation
@@ -39,7 +40,7 @@ class ModelTransport:
     """One action as one node sees it, whose messages go through the model world."""
 
     seen_since = float("-inf")  # it has discovered who is there
-    has_more = on_trial = False
+    has_more = beside_another = False
 
     def __init__(self, caller: Caller, node: int, name: str, listener: Listener) -> None:
         self._caller, self._node, self._name, self._listener = caller, node, name, listener
@@ -110,9 +111,9 @@ class ModelTransport:
         if self.closed or question is None:
             return
         kind, about, asked, by_server = question
-        self.reachability.answered(asked)
+        self.reachability.answer_came(asked)
         if kind == "probe":
-            self._listener.answered("result", about, asked, ((0, None),))
+            self._listener.answer_came("result", about, asked, ((0, None),))
             return
         if message.server.gid in by_server:
             return
@@ -120,7 +121,7 @@ class ModelTransport:
         answers = tuple(by_server.values())
         if kind == "result":
             answers = tuple((status, None) for status in answers)
-        self._listener.answered(kind, about, asked, answers)
+        self._listener.answer_came(kind, about, asked, answers)
 
 
 class ModelParticipant:
@@ -155,7 +156,7 @@ class ModelParticipant:
     def unheard(self) -> str:
         return ""
 
-    def seek(self, seeker: Any) -> None:
+    def seek(self, endpoint: Any) -> None:
         """There is nothing that is out of sight for good."""
 
 
@@ -259,7 +260,7 @@ class Caller:
         self.host = ModelHost(self)
         self._traffics = {number: self._traffic(number) for number in NODES}
         self._endpoints: dict[
-            tuple[str, int], ActionEndpoint
+            tuple[str, int], traffic.Endpoint
         ] = {}  # made when a leaf first wants them
         world.client = self
         judge.caller = self
@@ -278,7 +279,7 @@ class Caller:
                 "look": (lambda: (None,), lambda _: self.attend()),
                 "drained": (
                     self._left_behind,
-                    lambda handle: handle.endpoint.tell(handle.real, Event.DRAIN_GAVE_UP),
+                    lambda handle: tell(handle.real, Event.DRAIN_GAVE_UP),
                 ),
                 "rerun": (lambda: () if self.closed else NODES, self.run_again),
             }
@@ -309,7 +310,7 @@ class Caller:
     def _traffic(self, number: int) -> Traffic:
         return Traffic(self.host, ModelParticipant(self, number))
 
-    def come(self, action: str, node: int) -> ActionEndpoint:
+    def come(self, action: str, node: int) -> traffic.Endpoint:
         """Return the line of a node to an action, made when it is first wanted."""
         found = self._endpoints.get((action, node))
         if found is None:
@@ -335,8 +336,8 @@ class Caller:
         of_node = self._traffics[leaf.plan.node]
         to_action = self.come(leaf.plan.action, leaf.plan.node)
         if leaf.handle is not None and leaf.attempts is not None:
-            to_action.observe_and_tell(self.moment())
-            leaf.handle.endpoint.apply_deadlines(leaf.handle)
+            watcher.look(to_action, self.moment())
+            apply_deadlines(leaf.handle)
             goal = leaf.handle.goal
             if goal.outcome is not None:
                 self._judge_attempt(leaf, leaf.attempts, leaf.handle)
@@ -375,7 +376,7 @@ class Caller:
     def interrupt(self, leaf: Leaf) -> None:
         """What py_trees' terminate(INVALID) does; twice, because it may come twice."""
         if leaf.handle is not None:
-            leaf.handle.endpoint.tell(leaf.handle, Event.INTERRUPTED)
+            tell(leaf.handle, Event.INTERRUPTED)
             self.judge.interrupted_again(self.seen[leaf.handle.goal.id])
         leaf.handle = leaf.attempts = None
 
@@ -393,8 +394,8 @@ class Caller:
         """The process ends."""
         self.closed = True
         for handle in self.handles:
-            handle.endpoint.tell(handle.real, Event.PARKED)
-            handle.endpoint.tell(handle.real, Event.ABANDONED)
+            tell(handle.real, Event.PARKED)
+            tell(handle.real, Event.ABANDONED)
 
     def _left_behind(self) -> list[GoalHandle]:
         """Goals that are still waited for, though no leaf has them any more."""
@@ -434,7 +435,7 @@ class Caller:
     def _run_due(self) -> None:
         for each in self.host.scheduler.scheduled:
             assert isinstance(each, ActionEndpoint)
-            each.watcher.rest()  # a look is due
+            each.look_soon()  # a look is due
             each.run_due(self.moment())
             for real in each.goals.values():
                 handle = self.known(real.goal)
@@ -494,10 +495,10 @@ class Caller:
         return self.host.domain(DOMAIN).resources
 
     @property
-    def endpoints(self) -> list[ActionEndpoint]:
+    def endpoints(self) -> list[traffic.Endpoint]:
         return [each for of_node in self._traffics.values() for each in of_node._endpoints.values()]
 
-    def _endpoints_to(self, action: str) -> list[ActionEndpoint]:
+    def _endpoints_to(self, action: str) -> list[traffic.Endpoint]:
         return [each for each in self.endpoints if each.name == action]
 
     def accepted_on_server(self, job: Job) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.terms import STATUS_SUCCEEDED, Command, Event, State
-from bt_actions.traffic import handle as traffic
+from bt_actions.traffic import state as traffic
 from tests.machine.histories import Play
 from tests.machine.production import Witness
 

@@ -23,11 +23,8 @@ from bt_actions.goals.table import TABLE
 from bt_actions.goals.terms import MAY_STILL_BE_ACCEPTED, Command, Event, State
 from bt_actions.servers import replies
 from bt_actions.servers.stalls import Stalls
-from bt_actions.traffic import admission, handover
-from bt_actions.traffic.driver import Driver
-from bt_actions.traffic.ended import EndedGoals
-from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import GoalHandle
+from bt_actions.traffic import admission, driver, endpoint, handover
+from bt_actions.traffic.state import GoalHandle
 from tests.machine.crowds import CrowdPlay, crowded_history
 from tests.machine.histories import broken, first_broken, random_history, shrink, tell
 
@@ -78,14 +75,14 @@ def begins_though_it_was_interrupted(patch: Patch) -> None:
 
 @mutation
 def takes_a_late_answer_for_the_attempt_that_runs_now(patch: Patch) -> None:
-    def heard_of(endpoint: Any, goal_id: bytes, *, denies: bool = False) -> GoalHandle | None:
-        runs_now: GoalHandle | None = endpoint._host.caller.seen[goal_id].real.owner.handle
+    def heard_of(here: Any, goal_id: bytes, *, denies: bool = False) -> GoalHandle | None:
+        runs_now: GoalHandle | None = here.host.caller.seen[goal_id].real.owner.handle
         if runs_now is not None:
             return runs_now if runs_now.goal.sent else None
-        return original(endpoint, goal_id, denies=denies)
+        return original(here, goal_id, denies=denies)
 
-    original = ActionEndpoint._heard_of
-    patch.setattr(ActionEndpoint, "_heard_of", heard_of)
+    original = endpoint.ActionEndpoint._heard_of
+    patch.setattr(endpoint.ActionEndpoint, "_heard_of", heard_of)
 
 
 def tried_again_unless(patch: Patch, refused: Callable[[AttemptRecord], bool]) -> None:
@@ -225,7 +222,7 @@ def leaves_a_lost_goal_to_a_node_that_is_not_shown_its_server(patch: Patch) -> N
 
 @mutation
 def adopts_nothing_that_was_left(patch: Patch) -> None:
-    patch.setattr(handover, "adopt", lambda endpoint, host: None)
+    patch.setattr(handover, "adopt", lambda endpoint: None)
 
 
 @mutation
@@ -289,7 +286,7 @@ def runs_on_beside_the_goal_that_replaced_it(patch: Patch) -> None:
 
 @mutation
 def takes_preemption_for_a_failure(patch: Patch) -> None:
-    patch.setattr(Driver, "_rival_sent", lambda self, handle: False)
+    patch.setattr(driver, "_rival_sent", lambda handle: False)
 
 
 @mutation
@@ -377,8 +374,12 @@ OF_CROWDS: dict[str, tuple[Any, str, Callable[..., Any]]] = {
     "believes two of three": (replies, "_answers_wanted", lambda watch: 2),
     "waits for who is not there": (replies, "_answers_wanted", lambda watch: 3),
     "takes any answer for all": (replies.Replies, "_may_be_at_two", lambda self, watch: False),
-    "hears the first of two acceptances": (EndedGoals, "answered", lambda self, *answer: None),
-    "forgets what has ended": (EndedGoals, "keep", lambda self, handle: None),
+    "hears the first of two acceptances": (
+        endpoint,
+        "_ended_answered",
+        lambda endpoint, *answer: None,
+    ),
+    "forgets what has ended": (driver, "_keep_ended", lambda handle: None),
 }
 
 

@@ -31,7 +31,7 @@ class Heard:
         self.results: list[tuple[bytes, int, Any]] = []
         self.cancels: list[tuple[bytes, int]] = []
 
-    def answered(
+    def answer_came(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
         told = answers[-1] if request == "result" else (answers[-1],)
@@ -202,7 +202,7 @@ def test_a_listener_that_raises_is_told_all_the_same(
         heard.results.append((b"", 0, None))
 
     with monkeypatch.context() as patch:
-        patch.setattr(heard, "answered", fails)
+        patch.setattr(heard, "answer_came", fails)
         request(client, "cancel")
         request(client, "result")
         until(lambda: heard.results)

@@ -11,9 +11,9 @@ import pytest
 from bt_actions.goals.goal import Goal
 from bt_actions.goals.policy import End, Outcome, Timeouts
 from bt_actions.goals.terms import Event, Now, State
-from bt_actions.traffic.cancel_queue import Cancels
+from bt_actions.traffic import drain
 from bt_actions.traffic.drain import JUST_PAST, Drain
-from bt_actions.traffic.handle import GoalHandle
+from bt_actions.traffic.state import CancelQueue, GoalHandle
 from bt_actions.utilities.stepping import Done, Sleep
 
 LIMITS = Timeouts(accept=1.0, cancel=2.0)
@@ -36,11 +36,16 @@ def handle(end: End, look_out_left: float | None, state: State = State.LOST) -> 
     goal.outcome, goal.end, goal.state = Outcome.SERVER_LOST, end, state
     goal.deadlines.clear()
     goal.deadlines.arm(Event.LOOK_OUT_DUE, look_out_left)
-    nothing = dict.fromkeys(("deliver_arrived", "apply_deadlines"), lambda *_: None)
-    endpoint: Any = Endpoint(
-        in_doubt=lambda _: 0.0, is_parents=False, cancels=Cancels(), tell=tell, **nothing
-    )
+    endpoint: Any = Endpoint(is_parents=False, cancels=CancelQueue())
     return GoalHandle(goal, endpoint, None, "m")
+
+
+@pytest.fixture(autouse=True)
+def nothing_happens(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(drain, "tell", tell)
+    monkeypatch.setattr(drain, "in_doubt", lambda endpoint, now: False)
+    for what in ("deliver_arrived", "apply_deadlines"):
+        monkeypatch.setattr(drain, what, lambda _: None)
 
 
 def tell(handle: GoalHandle, event: Event) -> None:
@@ -74,39 +79,39 @@ def test_a_goal_is_over_when_nothing_of_it_is_waited_for(
 def test_who_is_looked_out_for_is_waited_for_but_not_without_end() -> None:
     host: Any = Host()
     lost = handle(End.SERVER_GONE, 2.0)
-    drain = Drain(host, [lost])
+    drains = Drain(host, [lost])
     host.now += 10.0
-    assert isinstance(drain.step(host.now), Sleep), "the process may have stood still"
+    assert isinstance(drains.step(host.now), Sleep), "the process may have stood still"
     assert list(lost.goal.due(Now(host.now, 0.0))) == [Event.LOOK_OUT_DUE]
-    assert drain.step(host.now) == Done([])
+    assert drains.step(host.now) == Done([])
 
 
 def test_what_was_left_by_a_node_that_is_gone_has_the_time_of_any_goal() -> None:
     host: Any = Host()
     left = handle(End.UNKNOWN, None)
-    drain = Drain(host, [left])
+    drains = Drain(host, [left])
     host.now += left.goal.drains_within
-    assert isinstance(drain.step(host.now), Sleep)
+    assert isinstance(drains.step(host.now), Sleep)
     host.now += 2 * JUST_PAST
-    assert drain.step(host.now) == Done([left])
+    assert drains.step(host.now) == Done([left])
 
 
 def test_who_is_back_has_the_time_of_a_cancel_but_only_once() -> None:
     host: Any = Host()
     handles = [handle(End.SERVER_GONE, 2.0), handle(End.UNKNOWN, None)]
-    drain, goal = Drain(host, handles), handles[0].goal
+    drains, goal = Drain(host, handles), handles[0].goal
     for back_again in (False, True):
         goal.state, goal.end = State.LOST, End.SERVER_GONE
-        drain.step(host.now)
+        drains.step(host.now)
         host.now += goal.drains_within + 2 * JUST_PAST
-        assert isinstance(drain.step(host.now), Sleep), "it is looked out for"
+        assert isinstance(drains.step(host.now), Sleep), "it is looked out for"
         goal.state, goal.end = State.CANCELING, End.UNKNOWN
-        assert isinstance(drain.step(host.now), Done) is back_again
+        assert isinstance(drains.step(host.now), Done) is back_again
 
 
 def test_who_is_in_a_hurry_waits_for_no_end() -> None:
     host: Any = Host()
     left = handle(End.UNKNOWN, None)
-    drain = Drain(host, [left])
-    assert isinstance(drain.step(host.now), Sleep)
-    assert drain.step(host.now, hurry=True) == Done([left])
+    drains = Drain(host, [left])
+    assert isinstance(drains.step(host.now), Sleep)
+    assert drains.step(host.now, hurry=True) == Done([left])

@@ -17,7 +17,7 @@ import pytest
 import rclpy.logging
 
 from bt_actions.ros import log as module
-from bt_actions.ros.log import LONGEST, MOST, Log
+from bt_actions.ros.log import LINE, LONGEST, MOST, Log
 from bt_actions.traffic.backend import LEVELS
 from tests.support.waiting import until
 
@@ -59,9 +59,17 @@ def log(written: Written) -> Log:
     return made
 
 
-def test_a_line_fits_into_a_pipe_that_has_room(log: Log, written: Written) -> None:
+def test_a_line_of_ours_is_one_line_that_can_be_read(log: Log, written: Written) -> None:
+    log.error("the motor\nis hot; " * 300 + "do this")
+    log.flush()
+    (line,) = written.lines
+    assert len(line.removeprefix("error: ")) == LINE
+    assert line.endswith("the motor is hot; do this")
+
+
+def test_a_tree_s_line_fits_into_a_pipe_that_has_room(log: Log, written: Written) -> None:
     """Standard error is asked for room before each, and never takes half a line."""
-    log.error("\N{CYRILLIC SMALL LETTER ZHE}" * LONGEST)
+    log.by("tree", "error", "\N{CYRILLIC SMALL LETTER ZHE}" * LONGEST)
     log.flush()
     (line,) = written.lines
     assert LONGEST - 1 <= len(line.removeprefix("error: ").encode()) <= LONGEST
@@ -175,6 +183,6 @@ def test_the_child_of_a_fork_leaves_to_its_parent_what_waits(log: Log, written: 
 
 
 def test_no_line_holds_what_a_terminal_obeys(log: Log, written: Written) -> None:
-    log.info("a\x1b]0;title\x07b\r\x9bc\u202ed\ud800\n\te")
+    log.by("tree", "info", "a\x1b]0;title\x07b\r\x9bc\u202ed\ud800\n\te")
     log.flush()
     assert written.lines == ["info: a ]0;title b  c d \n  \te"]

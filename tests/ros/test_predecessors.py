@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bt_actions.goals.ids import Author, new_goal_id
-from bt_actions.traffic.predecessors import warn_of_dead
+from bt_actions.traffic.endpoint import warn_of_dead
 
 
 def of_the_dead() -> bytes:

@@ -13,7 +13,8 @@ from bt_actions.goals.terms import Event
 from bt_actions.ros.action_transport import RosTransport
 from bt_actions.ros.host import host as process
 from bt_actions.ros.node_participant import traffic_of
-from bt_actions.traffic.host import Entry
+from bt_actions.traffic.driver import tell
+from bt_actions.traffic.state import Entry
 from tests.support.processes import Host, HostFactory
 from tests.support.trees import started, state
 from tests.support.waiting import until
@@ -117,8 +118,8 @@ def test_what_is_not_accounted_for_stays(
         goal = journal.wait_for("received").goal
         with process.lock:
             [handle] = traffic_of(node).endpoint(leaf.action_type, name).goals.values()
-            handle.endpoint.tell(handle, Event.PARKED)
-            handle.endpoint.tell(handle, Event.ABANDONED)
+            tell(handle, Event.PARKED)
+            tell(handle, Event.ABANDONED)
         assert [goal_id.hex() for goal_id in ledger.open] == [goal]
 
 
@@ -130,6 +131,6 @@ def test_that_its_server_went_away_is_on_record_and_that_it_is_back(
         assert lost
         with process.lock:
             [handle] = traffic_of(node).endpoint(leaf.action_type, name).goals.values()
-            handle.endpoint.tell(handle, Event.SERVER_RETURNED)
+            tell(handle, Event.SERVER_RETURNED)
             [(*_, lost)] = ledger.open.values()
             assert not lost

@@ -18,7 +18,7 @@ from bt_actions.ros.graph import enclave
 from bt_actions.ros.host import host as process
 from bt_actions.ros.rediscovery import SecondParticipant
 from bt_actions.servers.stalls import Stalls
-from bt_actions.traffic.route import Route
+from bt_actions.traffic import route
 from tests.support.trees import in_turn, started
 from tests.support.waiting import until
 
@@ -46,13 +46,9 @@ def blind(monkeypatch: pytest.MonkeyPatch, node: Any) -> Blind:
 @pytest.fixture(autouse=True)
 def nothing_else_is_missed(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     """What the tests before this have lost is not looked for meanwhile."""
-    misses = Route.misses
-    monkeypatch.setattr(Route, "misses", lambda self: is_of(self, name) and misses(self))
+    misses = route.misses
+    monkeypatch.setattr(route, "misses", lambda which: which.name == name and misses(which))
     until(nobody_looks, 10.0)
-
-
-def is_of(route: Route, name: str) -> bool:
-    return route._endpoint.name == name
 
 
 def nobody_looks() -> bool:
@@ -144,14 +140,13 @@ def test_a_look_is_taken_in_the_enclave_of_the_node_that_misses_something(
     from rclpy.node import Node
 
     enclaves = list[str]()
-    monkeypatch.setattr(Route, "misses", lambda self: is_of(self, name))
     monkeypatch.setattr(node_participant, "look_for", lambda *to: enclaves.append(to[2]))
     context = Context()
     context.init(args=["--ros-args", flag, "/kitchen/robot"], domain_id=domain)
     leaf, secure = MoveRobot("m", 0.1, action_name=name), Node("secure", context=context)
     leaf.setup(node=secure)
     with process.lock:
-        leaf._own.watcher._route.seek()
+        leaf._own.participant.seek(leaf._own)
     sight = SecondParticipant(domain, enclaves[0])
     assert {enclave(secure), enclave(sight.node)} == {"/kitchen/robot"}
     sight.close()
@@ -177,12 +172,11 @@ def test_where_a_part_of_the_names_is_remapped_nobody_looks(
     leaf = MoveRobot("m", 0.1, action_name=name)
     leaf.setup(node=remapped)
     looked_for = list[Any]()
-    monkeypatch.setattr(Route, "misses", lambda self: is_of(self, f"{name}/base"))
     monkeypatch.setattr(
         node_participant, "look_for", lambda seeker, *_: looked_for.append(seeker.name)
     )
     with process.lock:
-        leaf._own.watcher._route.seek()
+        leaf._own.participant.seek(leaf._own)
     assert looked_for == ([f"{name}/base"] if parts == PARTS else [])
     leaf.shutdown()
     remapped.destroy_node()

@@ -26,7 +26,7 @@ from unique_identifier_msgs.msg import UUID
 from bt_actions.goals.ids import new_goal_id
 from bt_actions.recovery.ledger import Ledger
 from bt_actions.ros.graph import servers
-from bt_actions.traffic.host import Entry
+from bt_actions.traffic.state import Entry
 action, domain, distance, known, lost = sys.argv[1:]
 domain, distance, lost = int(domain), float(distance), lost == "1"
 known = [known.encode()] if known else []

@@ -27,7 +27,7 @@ from bt_actions.goals.asking import ASK_AGAIN
 from bt_actions.ros.action_transport import FEEDBACK_AT_MOST
 from bt_actions.simulation.journal import live_intervals
 from bt_actions.traffic.endpoint import ActionEndpoint
-from bt_actions.traffic.handle import FEEDBACK_KEPT
+from bt_actions.traffic.state import FEEDBACK_KEPT
 from tests.support.accounts import Report, compare
 from tests.support.processes import HostFactory, Journal, Process
 from tests.support.reliability import Record
@@ -325,7 +325,7 @@ def test_a_result_that_overtakes_the_acceptance(
     record: Record,
 ) -> None:
     """A goal of 0.3 s whose acceptance is told after so many seconds, or never (None)"""
-    told = noted(monkeypatch, "answered", "goal")
+    told = noted(monkeypatch, "answer_came", "goal")
     journal = serve("1:drop_accept", tells_after=after)
     leaf = MoveRobot("m", 0.3, action_name=name, timeout=Timeouts(accept=5.0))
     with TreeRunner(leaf, node=node) as runner:

@@ -13,6 +13,7 @@ from py_trees.common import Status
 from bt_actions import End, MoveRobot, Outcome, Timeouts, TreeError, TreeRunner
 from bt_actions.ros.host import host as process
 from bt_actions.servers.presence import Server
+from bt_actions.traffic import route, watcher
 from tests.support.processes import Host, Journal
 from tests.support.reliability import Record, rounded
 from tests.support.trees import Gate, Guard, Raises, in_sequence, in_turn, started, state, together
@@ -251,12 +252,14 @@ class TestABehaviourThatRaises:
         journal = serve("1:delay_accept=0.3")
         warm = MoveRobot("warm", 0.0, action_name=name)
         warm.setup(node=node)  # so that the server is known, and the first tick sends
-        now, at = (
-            process.steady,
-            warm._own,
-        )  # nor is it in doubt since a stall in the tests before
-        at.watcher._route._long_stalls = process.stalls.long_times
-        until(lambda: at.recent_state(now()) is Server.READY and not at.holds_back(now()))
+        now, at = process.steady, warm._own
+
+        def may_be_sent_to() -> bool:
+            is_ready = watcher.recent_state(at, now()) is Server.READY
+            return is_ready and not route.holds_back(at, now())
+
+        at.long_stalls = process.stalls.long_times  # no doubt since a stall in the tests before
+        until(may_be_sent_to)
         leaf = MoveRobot("m", 5.0, action_name=name)
         root = together(leaf, Raises("culprit", method), name="root")
         with TreeRunner(root, node=node) as runner:

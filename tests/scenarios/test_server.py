@@ -32,7 +32,8 @@ from bt_actions.servers.presence import (
     Server,
     ServerWatch,
 )
-from bt_actions.traffic.endpoint import ActionEndpoint
+from bt_actions.traffic import route, watcher
+from bt_actions.traffic.state import Endpoint
 from tests.support.middleware import AS_IT_COMES, NOTHING_SET
 from tests.support.processes import Host, HostFactory, Journal, Process
 from tests.support.reliability import Record
@@ -70,9 +71,13 @@ def until_both_hear(leaf: MoveRobot, node: Any) -> None:
 
     def state_now() -> Server:
         with process.lock:
-            return endpoint.observe_and_tell(time.monotonic())
+            return watcher.look(endpoint, time.monotonic())
 
-    until(lambda: state_now() is Server.AMBIGUOUS, 9.0, meanwhile=endpoint.deliver_arrived)
+    until(
+        lambda: state_now() is Server.AMBIGUOUS,
+        9.0,
+        meanwhile=lambda: route.deliver_arrived(endpoint),
+    )
     as_if_nothing_was_asked(endpoint)
 
 
@@ -87,19 +92,19 @@ def until_heard(leaf: MoveRobot, node: Any) -> None:
         nonlocal asked_at
         with process.lock:
             now = time.monotonic()
-            if endpoint.observe_and_tell(now) is Server.READY and now - asked_at > PROBE_EVERY:
+            if watcher.look(endpoint, now) is Server.READY and now - asked_at > PROBE_EVERY:
                 asked_at = now
-                endpoint.probe()
+                route.probe(endpoint)
             return endpoint.transport.reachability.heard
 
-    until(is_heard, 9.0, meanwhile=endpoint.deliver_arrived)
+    until(is_heard, 9.0, meanwhile=lambda: route.deliver_arrived(endpoint))
     as_if_nothing_was_asked(endpoint)
 
 
-def as_if_nothing_was_asked(endpoint: ActionEndpoint) -> None:
+def as_if_nothing_was_asked(endpoint: Endpoint) -> None:
     """Have the endpoint begin anew with the servers that it sees."""
     with process.lock:
-        endpoint.deliver_arrived()
+        route.deliver_arrived(endpoint)
         endpoint.watch = ServerWatch()
         for probe in range(1, 100):
             endpoint.transport.forget(probe)
@@ -584,7 +589,7 @@ class TestStopped:
         first.setup(node=gone)
         endpoint = first._own
         assert endpoint is not None
-        ticking = lambda: (endpoint.deliver_arrived(), first.tick_once())  # noqa: E731
+        ticking = lambda: (route.deliver_arrived(endpoint), first.tick_once())  # noqa: E731
         until(lambda: state(first) == "EXECUTING", 20.0, meanwhile=ticking)
         first.shutdown()
         assert first.end is End.UNKNOWN
@@ -626,7 +631,7 @@ class TestStopped:
         first.setup(node=gone)
         endpoint = first._own
         assert endpoint is not None
-        ticking = lambda: (endpoint.deliver_arrived(), first.tick_once())  # noqa: E731
+        ticking = lambda: (route.deliver_arrived(endpoint), first.tick_once())  # noqa: E731
         until(lambda: state(first) == "EXECUTING", 20.0, meanwhile=ticking)
         killed = victim.kill()
         journal = successor.open(name)

@@ -40,9 +40,21 @@ def test_a_call_is_told_as_a_run_is(
     process = call("move", "--set", "distance=0.5", "--json")
     assert process.wait(60.0) == 1, process
     told = json.loads(process.lines[-1])
+    assert "goal_name" not in str(told), "which the command has made up"
     assert (told["exit_code"], told["error_code"], told["outputs"]) == (1, 20104, {})
     assert [each["outcome"] for each in told["actions"]] == ["ABORTED"]
     assert "Move / Go: ABORTED" in told["failures"][0]["reason"]
+
+
+def test_a_chain_of_failures_is_told_once(
+    serve: Callable[..., Journal], serve_trees: Serve, call: Call
+) -> None:
+    serve("1:abort=0.1")
+    serve_trees()
+    process = call("move", "--set", "distance=0.5")
+    assert process.wait(60.0) == 1, process
+    assert str(process).count("Move / Go: ABORTED") == 1, process
+    assert process.lines[-1].startswith("ABORTED: aborted by "), process
 
 
 @pytest.mark.parametrize(

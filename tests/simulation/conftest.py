@@ -182,7 +182,7 @@ class VirtualClient(Client):
     def cancel(self, goal: Goal) -> None:
         self._transport.cancel(bytes.fromhex(goal.goal_id))
 
-    def answered(
+    def answer_came(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
         goal = self._goals[goal_id]

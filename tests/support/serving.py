@@ -81,6 +81,7 @@ class Serving:
         thinks: float = 0.0,
         busy: float = 0.0,
         tells_after: float | None = None,
+        remembers: float = 20.0,
         **script: Any,
     ) -> None:
         """Serve MoveRobot under `name`: a goal takes as many seconds as its distance says.
@@ -112,7 +113,7 @@ class Serving:
             journal=journal,
             step_period=step_period,
             on_death=lambda: os.kill(os.getpid(), signal.SIGKILL),
-            result_timeout=20.0,
+            result_timeout=remembers,
         )
         server.tells_after = tells_after
 

@@ -48,7 +48,13 @@ def test_a_goal_of_which_nobody_knows_the_end_is_reported(fault: str) -> None:
     )
     runner = VirtualRunner(MoveRobot("move", 1.0, timeout=TIMEOUTS), network)
     assert runner.run() is Status.FAILURE
-    assert [(goal.name, goal.server) for goal in runner.unaccounted] == [("move", "/move_robot")]
+    [goal] = runner.unaccounted
+    assert (goal.name, goal.server, goal.fields) == ("move", "/move_robot", "{distance: 1.0}")
+    [told] = [line for line in network.log.lines if "not accounted for" in str(line)]
+    assert f"move on /move_robot, goal {goal.goal_id}" in str(told)
+    assert "{distance: 1.0}" in str(told)
+    assert "`bt-actions cleanup /move_robot` cancels it" in str(told)
+    assert "<Goal" not in str(told)
 
 
 def test_two_servers_under_one_name_are_not_spoken_to() -> None:

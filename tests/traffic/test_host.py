@@ -9,7 +9,7 @@ import pytest
 
 from bt_actions.testing.host import VirtualHost
 from bt_actions.testing.network import VirtualNetwork
-from bt_actions.traffic.host import Entry, Host
+from bt_actions.traffic.state import Entry, Host
 from tests.support.waiting import until as until_real
 
 WORLDS = [pytest.param("virtual", id="virtual"), pytest.param("ros", marks=pytest.mark.ros)]

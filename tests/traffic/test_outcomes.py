@@ -20,7 +20,8 @@ from bt_actions.behaviours.variables import read
 from bt_actions.events import GoalChanged
 from bt_actions.testing import VirtualBackend
 from bt_actions.testing.transport import VirtualParticipant
-from bt_actions.traffic import handover
+from bt_actions.traffic import handover, watcher
+from bt_actions.traffic.state import GoalHandle, Run
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.virtual import World
 
@@ -634,8 +635,8 @@ def test_a_lost_goal_that_another_node_takes_over_is_still_known_to_be_left(
     until_it_runs(world, leaves[0])
     one, two = (leaf._own for leaf in leaves)
     monkeypatch.setattr(one.transport, "servers", frozenset)
-    one.observe_and_tell(here.host.steady())
-    two.watch.observe(here.host.steady(), True, two.transport.servers())
+    watcher.look(one, here.host.steady())
+    two.watch.see(here.host.steady(), True, two.transport.servers())
     handover.take_over(two, here.host.steady())
     [handle] = leaves[0].open_handles()
     assert handle.goal.lost
@@ -653,6 +654,40 @@ def test_a_node_that_is_destroyed_while_a_goal_is_made_sends_it_not(world: World
         world.network.timeline.advance(world.network.now() + 0.05)
     assert stood(leaf) == (Outcome.CANCELED, End.NEVER_STARTED)
     assert journal.count("received") == 0
+
+
+def test_a_leaf_that_was_shut_down_and_is_set_up_again_has_a_transport_that_is_open(
+    world: World,
+) -> None:
+    node, leaf = VirtualBackend(world.network), MoveRobot("m", 0.1)
+    for _ in range(2):
+        leaf.setup(node=node)
+        transport = leaf._own.transport
+        assert not transport.closed
+        leaf.shutdown()
+        assert transport.closed
+
+
+def test_all_that_a_goal_has_decided_is_done_before_what_follows_for_the_next(world: World) -> None:
+    """The result of the first gives the server to the second, which is told when that is over."""
+    world.serve()
+    node = VirtualBackend(world.network)
+    first, second = MoveRobot("first", 0.1), MoveRobot("second", 0.1)
+    for leaf in (first, second):
+        leaf.setup(node=node)
+    until_it_runs(world, first)
+    second.tick_once()
+    [waits] = second.open_handles()
+    there = list[list[str]]()
+
+    def note(changed: GoalHandle | None) -> None:
+        if changed is not None:
+            there.append([each.name for each in changed.endpoint.handles])
+
+    waits.run = Run(note)
+    while not there:
+        world.network.timeline.advance(world.network.now() + 0.05)
+    assert there == [["second"]]
 
 
 def until_it_runs(world: World, leaf: ActionBehaviour) -> None:

@@ -23,7 +23,8 @@ from bt_actions.goals.terms import (
 from bt_actions.simulation import Script, ScriptedServer
 from bt_actions.testing import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
-from bt_actions.traffic.transport import ActionTransport, Participant, Request, nobodys, probe
+from bt_actions.traffic.state import Participant
+from bt_actions.traffic.transport import ActionTransport, Request, nobodys, send_probe
 from tests.support.waiting import until
 
 NUMBERS = itertools.count(1)
@@ -103,7 +104,7 @@ class Heard:
         self.feedback: list[tuple[bytes, Any]] = []
         self.delivered = 0
 
-    def answered(
+    def answer_came(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
         if request == "result":
@@ -222,7 +223,7 @@ def test_an_answer_to_a_cancel_says_what_was_meant(side: Side, fault: str, code:
 def test_each_of_two_servers_answers_and_the_answers_add_up(side: Side) -> None:
     side.serve()
     side.serve()
-    probe(side.transport, 7, 0.0)
+    send_probe(side.transport, 7, 0.0)
     side.until_told(("result", nobodys(7), (0,)), ("result", nobodys(7), (0, 0)))
     side.heard.told.clear()
     goal_id = side.send()
@@ -232,20 +233,21 @@ def test_each_of_two_servers_answers_and_the_answers_add_up(side: Side) -> None:
 def test_of_what_is_forgotten_only_a_further_acceptance_is_told(side: Side) -> None:
     side.serve("1:delay_accept=0.3")
     goal_id = side.send()
-    probe(side.transport, 7, 0.0)
+    send_probe(side.transport, 7, 0.0)
     side.transport.cancel(goal_id)
     side.transport.forget(goal_id)
     side.transport.forget(nobodys(7))
     side.until_told(("goal", goal_id, (True,)))
 
 
-def test_on_trial_it_tells_of_statuses_alone(side: Side) -> None:
-    side.transport.on_trial = True
+def test_beside_another_it_tells_of_no_feedback(side: Side) -> None:
+    side.transport.beside_another = True
     side.serve()
     goal_id = side.send()
     side.world.until(lambda: any(goal_id in each for each in side.heard.statuses))
-    side.world.until(lambda: side.transport.reachability.heard)
-    assert (side.heard.told, side.heard.feedback) == ([], [])
+    side.transport.ask_result(goal_id)
+    side.until_told(("goal", goal_id, (True,)), ("result", goal_id, (STATUS_SUCCEEDED,)))
+    assert side.heard.feedback == []
 
 
 def test_who_comes_later_is_shown_the_statuses_that_there_are(side: Side) -> None:
@@ -269,6 +271,6 @@ def test_what_is_closed_tells_nothing(side: Side) -> None:
     closed.close()
     closed.close()
     assert closed.closed
-    probe(side.transport, 1, 0.0)
+    send_probe(side.transport, 1, 0.0)
     side.until_told(("result", nobodys(1), (0,)))
     assert heard.told == []

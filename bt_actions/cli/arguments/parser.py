@@ -13,6 +13,7 @@ from typing import Any, NoReturn, TypeAlias
 from bt_actions.cli.arguments.values import meant_by
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.streams.writing import write
+from bt_actions.utilities.shorten import fit
 from bt_actions.utilities.suggest import did_you_mean
 
 Subparsers: TypeAlias = "argparse._SubParsersAction[Parser]"  # noqa: SLF001 - no public name
@@ -83,11 +84,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print `message` on one line and exit with 2."""
-        self.exit(Exit.BAD_INPUT, f"{self.prog}: {message}\n")
+        self.exit(Exit.BAD_INPUT, f"{fit(f'{self.prog}: {message}')}\n")
 
 
 def _suggestion(word: str, known: Sequence[str] | dict[str, Any]) -> str:
-    beginnings = [name for name in known if len(word) > 3 and name.startswith(word)]
-    if len(beginnings) == 1:
-        return f"; did you mean {beginnings[0]!r}?"
     return did_you_mean(word, known) or "; there are " + ", ".join(known)

@@ -7,6 +7,7 @@ tree. What the server tells at the end is shown as if the tree had run here.
 from __future__ import annotations
 
 import argparse
+import functools
 import os
 import sys
 import uuid
@@ -69,21 +70,25 @@ def run(args: argparse.Namespace) -> int:
 
     from bt_actions.cli.driving.session import Session
     from bt_actions.cli.views.lines import QuietView
-    from bt_actions.cli.views.served_run import CallJsonView, CallView, Rejected
+    from bt_actions.cli.views.served_run import CallJsonView, CallView, rejection
+    from bt_actions.goals.policy import Outcome
 
-    rejection = Rejected(leaf, goal_name)
+    @functools.cache  # asked once, when somebody wants to know
+    def rejected() -> tuple[Exit, str] | None:
+        return rejection(goal_name) if leaf.outcome is Outcome.REJECTED else None
+
     with Session(leaf, namespace=args.namespace, name=name) as session:
         view: View = CallView(session.report, leaf, sys.stdout, feedback=True)
         if args.json:
             view = as_json = session.json_view(CallJsonView)
-            as_json.rejection = rejection
+            as_json.rejection = rejected
         elif args.quiet:
             view = QuietView(session.report, sys.stdout)
         code = session.run(view, timeout=args.timeout)
-    if code is not Exit.FAILURE or not rejection.happened:
+    if code is not Exit.FAILURE or not (why := rejected()):
         return code
-    note(f"bt-actions call: {rejection.text}")
-    return rejection.exit_code
+    note(f"bt-actions call: {why[1]}")
+    return why[0]
 
 
 def _leaf(tree: str, server: str, inputs: dict[str, object], goal_name: str) -> RunTree:

@@ -223,7 +223,7 @@ def _server(node: Any, options: Mapping[str, Any]) -> TreeServer:
             python=options["python"],
             managed=True,
         )
-    except (NotADirectoryError, TreeNotFoundError) as error:
+    except (OSError, TreeNotFoundError) as error:
         raise BadInput(f"--trees: {error}") from error
 
 

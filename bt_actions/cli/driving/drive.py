@@ -18,7 +18,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from signal import Signals as Signal
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from py_trees.common import Status
 
@@ -30,12 +30,10 @@ from bt_actions.cli.streams.writing import discard_stdout, note
 from bt_actions.cli.views.lines import QuietView
 from bt_actions.cli.views.view import View
 from bt_actions.cli.views.words import Closing, waiting_text
+from bt_actions.events import Event
+from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.running.loop import UnusableTree
 from bt_actions.running.report import Report
-
-if TYPE_CHECKING:
-    from bt_actions.events import Event
-    from bt_actions.running.goals import GoalReport
 
 FRAME = 0.1
 """Seconds between two drawings where nothing happens."""
@@ -285,22 +283,15 @@ class Drive:
     def _settle(self) -> None:
         """Ask which goals have no known end."""
         goals = {goal.goal_id: goal for goal in self._runner.unaccounted}
-        lines = [
-            f"{goal.name} on {goal.server}, goal {goal.goal_id}"
-            + (f": {goal.reason}" if goal.reason else "")
-            for goal in goals.values()
-        ]
         if self._abandoned:
-            lines += [
-                f"{self._report.called(row.behaviour)} on {row.server}, goal {goal_id}, "
-                f"{state.lower()} when left"
-                for row in self._report.live
-                for goal_id, state in row.live.items()
-                if goal_id not in goals
-            ]
             for row in self._report.live:
+                name = self._report.called(row.behaviour)
+                for goal_id, state in row.live.items():
+                    why = f"{state.lower()} when left"
+                    report = GoalReport(name, row.server, goal_id, row.outcome, why)
+                    goals.setdefault(goal_id, report)
                 row.leave(self._report.now)
-        self._report.unaccounted = lines
+        self._report.unaccounted = [str(goal) for goal in goals.values()]
 
     def _code(self) -> Exit:
         if self._report.unaccounted or (self._abandoned and not self._report.finished):

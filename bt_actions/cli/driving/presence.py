@@ -72,10 +72,11 @@ class Presence:
         if failed:
             self._rosout.say("error", f"{self._name}: {failed}")
         word = status.value if status is not Status.INVALID else "STOPPED"
-        unaccounted = [f"{goal.name} on {goal.server}" for goal in self._runner.unaccounted]
+        unaccounted = self._runner.unaccounted
+        for goal in unaccounted:
+            self._rosout.say("error", f"{self._name}: not accounted for: {goal}")
         text = f"{self._name} ends: {word} after {self._report.elapsed():.2f} s"
         text += ", left without waiting for its goals" if left else ""
-        text += f"; not accounted for: {', '.join(unaccounted)}" if unaccounted else ""
         wrong = left or unaccounted or failed or status is Status.FAILURE
         self._rosout.say("error" if wrong else "info", text)
         self._rosout.close()

@@ -14,6 +14,7 @@ from bt_actions.cli.driving.signals import Signals
 from bt_actions.cli.exits import Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.writing import note
 from bt_actions.utilities.plain_text import raised
+from bt_actions.utilities.shorten import fit
 
 
 class Server(Protocol):
@@ -69,4 +70,4 @@ def serve(
 def say(text: str) -> None:
     """Print a line at once, whether or not anybody reads it."""
     with contextlib.suppress(OSError, ValueError):
-        print(text, flush=True)
+        print(fit(text), flush=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import sys
 import traceback
 from collections.abc import Sequence
@@ -98,6 +99,7 @@ class Session:
                 raise
 
     def __enter__(self) -> Self:
+        logging.getLogger("bt_actions").addFilter(_is_news)
         self._output.__enter__()
         return self
 
@@ -106,6 +108,7 @@ class Session:
             self._runner.shutdown()
         finally:
             self._output.__exit__()
+            logging.getLogger("bt_actions").removeFilter(_is_news)
 
     def view(self, *, as_json: bool = False, plain: bool = False, verbose: bool = False) -> View:
         """Return the view that suits standard output: lines if `plain`; `verbose` is about them."""
@@ -227,6 +230,11 @@ class _Simulator:
             self.said = simulation.describe()
             simulation.close()
         self._node.destroy_node()
+
+
+def _is_news(record: logging.LogRecord) -> bool:
+    """Whether the view does not tell it: which goals are not accounted for, it does at the end."""
+    return "accounted for" not in record.getMessage()
 
 
 def _gap_object(lines: int) -> str:

@@ -41,7 +41,7 @@ def sweep(
         if swept.elsewhere:
             goals = (f"{goal_id.hex()} on {action}" for goal_id, action in swept.elsewhere.items())
             note(
-                f"not touched: {', '.join(goals)}: of bt_actions on another machine, or in "
+                f"not touched: {listing(goals, 1)}: of bt_actions on another machine, or in "
                 "another container, where it cannot be seen whether it is alive (see "
                 "BT_ACTIONS_MACHINE)"
             )

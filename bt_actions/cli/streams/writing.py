@@ -8,6 +8,7 @@ import sys
 from typing import TextIO
 
 from bt_actions.cli.streams.results import results
+from bt_actions.utilities.shorten import fit
 
 
 class OutputLost(Exception):
@@ -45,9 +46,12 @@ def _discard(stream: TextIO) -> None:
 
 
 def note(message: str, end: str = "\n") -> None:
-    """Write one message for the user to standard error, whoever may still be reading it."""
+    """Write one message for the user to standard error, whoever may still be reading it.
+
+    Each of its lines is one that a user reads: a long one is written without its middle.
+    """
     try:
-        print(message, file=sys.stderr, flush=True, end=end)
+        print("\n".join(map(fit, message.split("\n"))), file=sys.stderr, flush=True, end=end)
     except (OSError, ValueError):
         _discard(sys.stderr)
 

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 from uuid import UUID
 
 from py_trees.behaviour import Behaviour
 
 from bt_actions.cli.views.words import Closing, outputs_of
+from bt_actions.document import tree_name
+from bt_actions.events import Event, GoalChanged, NodeChanged, TreeStarted
 from bt_actions.render import kind, rows
 from bt_actions.running.report import Report, Row, place_of
 from bt_actions.utilities.plain_text import as_json
-
-if TYPE_CHECKING:
-    from bt_actions.events import Event
 
 
 class JsonView:
@@ -30,9 +29,6 @@ class JsonView:
 
     def event(self, event: Event) -> None:
         """Write `event` as an object."""
-        from bt_actions.document import tree_name
-        from bt_actions.events import GoalChanged, NodeChanged, TreeStarted
-
         time = round(event.time - self._report.started, 4)
         if isinstance(event, TreeStarted):
             root = self._report.root

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.cli.views.words import Closing, goal_text, last_words, troubles
+from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.render import action_of
 from bt_actions.running.report import DONE, Report, Row
 from bt_actions.utilities.plain_text import clean
-
-if TYPE_CHECKING:
-    from bt_actions.events import Event, GoalChanged
+from bt_actions.utilities.shorten import fit
 
 LASTING = 1.0
 """Seconds after which a goal that still waits, or is still being canceled, gets a line."""
@@ -52,8 +51,6 @@ class LineView:
 
     def event(self, event: Event) -> None:
         """Write a line when `event` changes what was written before."""
-        from bt_actions.events import GoalChanged, NodeChanged, TreeFinished
-
         if isinstance(event, NodeChanged):
             if event.status in self._told_of(event.node):
                 told = "" if event.message in ("", Outcome.SUCCEEDED) else f": {event.message}"
@@ -135,7 +132,7 @@ class LineView:
         self._write(f"{self._report.now - self._report.started:8.2f} s  {what:<8} {clean(text)}")
 
     def _write(self, line: str) -> None:
-        self._out.write(f"{line}\n")
+        self._out.write(f"{fit(line)}\n")
         self._out.flush()
 
 

@@ -7,8 +7,6 @@ be drawn over.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from rich.console import Console
@@ -19,11 +17,9 @@ from bt_actions import render
 from bt_actions.cli.streams.stderr import CaughtStderr
 from bt_actions.cli.views.choosing import branches, choose, fork_of, is_below
 from bt_actions.cli.views.words import Closing, feedback_text, goal_text, last_words
+from bt_actions.events import Event, NodeChanged
 from bt_actions.running.report import Report, Row
 from bt_actions.utilities.plain_text import clean
-
-if TYPE_CHECKING:
-    from bt_actions.events import Event
 
 _STYLES = {
     Status.SUCCESS: "green",
@@ -95,8 +91,6 @@ class LiveView:
 
     def event(self, event: Event) -> None:
         """Take in one event; let finished work scroll by."""
-        from bt_actions.events import NodeChanged
-
         if not isinstance(event, NodeChanged):
             return
         node = event.node

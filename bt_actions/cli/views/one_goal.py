@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TextIO
 
+from bt_actions.cli.views import words
+from bt_actions.events import Event, GoalChanged
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.running.report import Report, Row
+from bt_actions.utilities.shorten import fit
+
 if TYPE_CHECKING:
     from bt_actions.behaviours.action import ActionBehaviour
-    from bt_actions.cli.views.words import Closing
-    from bt_actions.events import Event
-    from bt_actions.running.report import Report, Row
 
 
 class GoalView:
@@ -30,12 +33,9 @@ class GoalView:
 
     def event(self, event: Event) -> None:
         """Write where the goal stands, when that has changed."""
-        from bt_actions.cli.views.words import goal_text
-        from bt_actions.events import GoalChanged
-
         if not isinstance(event, GoalChanged):
             return
-        text = goal_text(self._report.row(event.behaviour))
+        text = words.goal_text(self._report.row(event.behaviour))
         if event.outcome is None and text != self._last:
             self._last = text
             self._line(text)
@@ -52,40 +52,28 @@ class GoalView:
         """Write `text` on a line of its own."""
         self._line(text)
 
-    def finish(self, closing: Closing) -> None:
+    def finish(self, closing: words.Closing) -> None:
         """Write the result and the outcome."""
-        from bt_actions.cli.views.words import CLEAN_UP, goal_text, stood_still
-        from bt_actions.goals.policy import Outcome
-
         for line in self.result_lines():
             self._line(line)
         for row in self._report.rows:
+            if self._leaf.history:
+                row.reason = self._leaf.history[-1].goal.reason  # the result was told above
             if closing.cause and row.outcome is Outcome.CANCELED:
                 row.reason = closing.cause  # here is no tree that could have interrupted it
-            self._line(f"{goal_text(row)}, after {row.seconds(self._report.now):.2f} s")
-        if closing.error:
-            self._line(closing.error)
-        if self._report.servers_gone:
-            self._line(stood_still(self._report))
-        if self._report.unaccounted:
-            self._line(CLEAN_UP)
-        for line in self._report.unaccounted:
-            self._line(f"not accounted for: {line}")
+            self._line(f"{words.goal_text(row)}, after {row.seconds(self._report.now):.2f} s")
+        for line in words.left_open(self._report, closing):
+            self._line(line)
 
     def feedback_text(self, row: Row) -> str:
         """Return the latest feedback on one line."""
-        from bt_actions.cli.views.words import feedback_text
-
-        return feedback_text(row)
+        return words.feedback_text(row)
 
     def result_lines(self) -> list[str]:
         """Return what the goal's result says."""
-        from bt_actions.cli.views.words import result_lines
-        from bt_actions.goals.policy import End
-
         if self._leaf.end not in (End.SUCCEEDED, End.ABORTED):
             return []  # only these have a result of their own
-        return result_lines(self._leaf.result)
+        return words.result_lines(self._leaf.result)
 
     def close(self) -> None:
         """Leave the line that feedback was drawn on."""
@@ -103,5 +91,5 @@ class GoalView:
     def _line(self, text: str) -> None:
         start = "\r\x1b[K" if self._drawn else ""
         self._drawn = False
-        self._out.write(f"{start}{text}\n" if text else start)
+        self._out.write(f"{start}{fit(text)}\n" if text else start)
         self._out.flush()

@@ -2,55 +2,31 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.one_goal import GoalView
+from bt_actions.cli.views.table import columns
+from bt_actions.cli.views.words import Closing, brief
+from bt_actions.running.report import Row
 from bt_actions.utilities.places import told_apart
 from bt_actions.utilities.plain_text import clean
-
-if TYPE_CHECKING:
-    from bt_actions.behaviours.run_tree import RunTree
-    from bt_actions.cli.views.words import Closing
-    from bt_actions.running.report import Row
 
 _NOT_NOW = ("BUSY", "INACTIVE")
 """Codes of rejections that say nothing against the tree or its inputs."""
 
 
-class Rejected:
-    """Why the server rejected the goal, if it did; asked once, when somebody wants to know."""
+def rejection(goal_name: str) -> tuple[Exit, str]:
+    """Ask why the server rejected a goal: whether what was asked for is wrong, and in words."""
+    from bt_actions.serving.client import why_rejected
 
-    def __init__(self, leaf: RunTree, goal_name: str) -> None:
-        self._leaf = leaf
-        self._goal_name = goal_name
-
-    @property
-    def happened(self) -> bool:
-        """Whether it did."""
-        from bt_actions.goals.policy import Outcome
-
-        return self._leaf.outcome is Outcome.REJECTED
-
-    @cached_property
-    def _why(self) -> tuple[str, str] | None:
-        from bt_actions.serving.client import why_rejected
-
-        why = why_rejected(self._goal_name)
-        return None if why is None else (clean(why.code), clean(why.message))
-
-    @property
-    def text(self) -> str:
-        """Code and reason."""
-        return ": ".join(self._why or ("the server rejected the goal", "why is in its log"))
-
-    @property
-    def exit_code(self) -> Exit:
-        """Whether something is wrong with what was asked for."""
-        wrong = self._why is not None and self._why[0] not in _NOT_NOW
-        return Exit.BAD_INPUT if wrong else Exit.FAILURE
+    why = why_rejected(goal_name)
+    if why is None:
+        return Exit.FAILURE, "the server rejected the goal: why is in its log"
+    code = Exit.FAILURE if why.code in _NOT_NOW else Exit.BAD_INPUT
+    return code, clean(f"{why.code}: {why.message}")
 
 
 class CallView(GoalView):
@@ -67,9 +43,6 @@ class CallView(GoalView):
 
     def result_lines(self) -> list[str]:
         """Return the table of the run's actions, its outputs, and why it failed."""
-        from bt_actions.cli.views.table import columns
-        from bt_actions.cli.views.words import brief
-
         result = self._leaf.result
         if result is None:
             return []
@@ -95,7 +68,7 @@ class CallView(GoalView):
 class CallJsonView(JsonView):
     """The objects of `run --json`; outputs and actions are those of the run there."""
 
-    rejection: Rejected
+    rejection: Callable[[], tuple[Exit, str] | None]
 
     def _finished(self, closing: Closing) -> dict[str, object]:
         finished = super()._finished(closing)
@@ -104,9 +77,8 @@ class CallJsonView(JsonView):
             finished["outputs"] = _outputs(leaf.result)
             finished["actions"] = [_action(each) for each in leaf.result.actions]
             finished["error_code"] = leaf.result.error_code
-        if closing.exit_code is Exit.FAILURE and self.rejection.happened:
-            finished["exit_code"] = int(self.rejection.exit_code)
-            finished["error"] = self.rejection.text
+        if closing.exit_code is Exit.FAILURE and (rejected := self.rejection()):
+            finished["exit_code"], finished["error"] = int(rejected[0]), rejected[1]
         return finished
 
 

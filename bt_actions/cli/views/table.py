@@ -5,12 +5,13 @@ from __future__ import annotations
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
 from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import MESSAGE, fit
 
 STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
 """Outcomes that say how the goal ended on its server."""
 
 
-def table(report: Report, width: int | None = None) -> list[str]:
+def table(report: Report, width: int = MESSAGE) -> list[str]:
     """Return the table of actions as lines; names are cut so that lines fit into `width`."""
     body = [
         (
@@ -44,14 +45,13 @@ def verdict(row: Row) -> str:
     return f"{row.outcome}{told}{', late' if late else ''}"
 
 
-def columns(body: list[tuple[str, str, str, str, str]], width: int | None = None) -> list[str]:
+def columns(body: list[tuple[str, str, str, str, str]], width: int = MESSAGE) -> list[str]:
     """Return name, server, tries, verdict and duration of actions as lines, under a head."""
     head = ("action", "server", "attempts", "outcome", "duration")
     widths = [max(len(line[column]) for line in (head, *body)) for column in range(len(head))]
-    if width is not None:
-        for column in (1, 0):  # the server first: it is often a long name
-            excess = sum(widths) + 2 * (len(widths) - 1) - width
-            widths[column] -= max(0, min(excess, widths[column] - 8))
+    for column in (1, 0):  # the server first: it is often a long name
+        excess = sum(widths) + 2 * (len(widths) - 1) - width
+        widths[column] -= max(0, min(excess, widths[column] - 8))
     right = {2, 4}
     return [
         "  ".join(
@@ -76,10 +76,12 @@ def summary(report: Report) -> list[str]:
             lines.append(f"  failed{_because(culprit.message)}")
         else:
             tries = "1 attempt" if row.attempt == 1 else f"{row.attempt} attempts"
-            lines.append(f"  {row.outcome} after {tries}{_because(row.reason or culprit.message)}")
+            is_told = row.end is End.UNKNOWN  # of the goal that is not accounted for
+            why = "" if is_told else _because(row.reason or culprit.message)
+            lines.append(f"  {row.outcome} after {tries}{why}")
         if culprit.place:
             lines.append(f"  {culprit.place}")
-    return lines
+    return [fit(line) for line in lines]
 
 
 def _because(reason: str) -> str:

@@ -5,12 +5,10 @@ A view only writes; it decides nothing.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from bt_actions.cli.views.words import Closing
-
-if TYPE_CHECKING:
-    from bt_actions.events import Event
+from bt_actions.events import Event
 
 
 class View(Protocol):

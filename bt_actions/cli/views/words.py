@@ -5,7 +5,6 @@ Pure functions of the report and of messages; nothing here writes anything.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from py_trees.common import Status
@@ -15,7 +14,8 @@ from bt_actions.cli.views.table import summary, table
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.running.report import Report, Row
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import shorten
+from bt_actions.utilities.shorten import MESSAGE, fit, shorten
+from bt_actions.utilities.suggest import listing
 
 _USUAL_ENDS = {
     Outcome.SUCCEEDED: End.SUCCEEDED,
@@ -35,9 +35,8 @@ MOST = 3
 """Of many actions that are waited for, or many items of a list, how many are shown."""
 MANY = 20
 """Items of a list that is shown whole."""
-LONG = 300
+LONG = 200
 """Characters of a value; longer ones are cut."""
-CLEAN_UP = "`bt-actions cleanup` cancels what may still be running, once its server is in sight:"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +54,7 @@ class Closing:
     """The bug in a behaviour that ended the run, or ""."""
 
 
-def last_words(report: Report, closing: Closing, width: int | None = None) -> list[str]:
+def last_words(report: Report, closing: Closing, width: int = MESSAGE) -> list[str]:
     """Return the table, the verdict, how long it took, and last what went wrong."""
     lines = ["", *table(report, width)] if report.rows else []
     outputs = [clean(f"{name}: {brief(value)}") for name, value in outputs_of(report).items()]
@@ -80,31 +79,28 @@ def outputs_of(report: Report) -> dict[str, object]:
 
 def brief(value: object) -> str:
     """Return a value as people read it, short however large it is; a text without quotes."""
-    if not isinstance(value, str):
-        return shorten(value, LONG)
-    return value if len(value) <= LONG else f"{value[: LONG - 1]}…"
+    return fit(value, LONG) if isinstance(value, str) else shorten(value, LONG)
 
 
 def troubles(report: Report, closing: Closing) -> list[str]:
     """Return what went wrong, the gravest last; empty when nothing did."""
     warned = [f"{' / '.join(each.path)}: {each.message}" for each in report.warnings]
-    lines = [f"warning: {clean(line)}" for line in warned] + summary(report)
-    if report.servers_gone and not closing.verdict:
-        lines.append(stood_still(report))
-    lines += [line for line in (closing.complaint, closing.error) if line]
-    if report.unaccounted and not closing.verdict:  # of a simulation, which ends with us
-        lines.append(CLEAN_UP)
+    warnings = [fit(f"warning: {clean(line)}") for line in warned]
+    return [*warnings, *summary(report), *left_open(report, closing)]
+
+
+def left_open(report: Report, closing: Closing) -> list[str]:
+    """Return what went wrong beside the tree, and what is not known, the gravest last."""
+    lines = [line for line in (closing.complaint, closing.error) if line]
+    left = {row.server for row in report.rows if row.left_at_server or row.live}
+    if left and not closing.verdict:  # of a simulation, which ends with us
+        which = " ".join(["", *sorted(left)]) if len(left) <= MOST else ""
+        lines.append(
+            "A goal may still run, or run on where its server only stood still: once that is in "
+            f"sight, `bt-actions cleanup{which}` cancels it."
+        )
     lines += [f"not accounted for: {line}" for line in report.unaccounted]
-    return lines
-
-
-def stood_still(report: Report) -> str:
-    """Say what to do about servers that went away with a goal."""
-    servers = " ".join(sorted({row.server for row in report.rows if row.left_at_server}))
-    return (
-        "A server that only stood still, or was cut off, may go on with its goal; once it is back,"
-        f" `bt-actions cleanup {servers}` cancels that."
-    )
+    return [fit(clean(line)) for line in lines]
 
 
 def goal_text(row: Row) -> str:
@@ -121,8 +117,8 @@ def goal_text(row: Row) -> str:
         return f"{words.get(row.state, row.state.lower())} {row.server}{attempt}"
     text = f"{row.outcome}{attempt}"
     if row.end is End.UNKNOWN:
-        text += ", end not known" if not row.live else ", end not known yet"
-    elif row.in_doubt:
+        return f"{text}, end not known{' yet' if row.live else ''}"  # why, is told of the goal
+    if row.in_doubt:
         text += ", not started as far as its server knows"
     elif row.end is not None and row.end is not _USUAL_ENDS.get(row.outcome):
         text += f", ended {row.end}"
@@ -144,31 +140,18 @@ def waiting_text(report: Report) -> str:
 
 
 def _where(report: Report, rows: list[Row]) -> str:
-    which = ", ".join(f"{report.called(row.behaviour)} on {row.server}" for row in rows[:MOST])
-    return f"{which} and {len(rows) - MOST} more" if len(rows) > MOST else which
+    return listing([f"{report.called(row.behaviour)} on {row.server}" for row in rows], MOST)
 
 
 def feedback_text(row: Row) -> str:
     """Return the latest feedback of an action on one line: its plain fields."""
+    from bt_actions.messages.fields import fields_in_words
+
     progress = getattr(row.behaviour, "progress", None)
     if progress is None:
         return ""
     message = progress().feedback
-    return "" if message is None else fields_text(message)
-
-
-def fields_text(message: object, most: int = 4) -> str:
-    """Return the first scalar fields of a ROS message: names, values, constants by their name."""
-    parts: list[str] = []
-    for field in getattr(message, "get_fields_and_field_types", dict[str, str])():
-        value = getattr(message, field)
-        if isinstance(value, float):
-            parts.append(f"{field} {value:.2f}" if math.isfinite(value) else f"{field} {value}")
-        elif isinstance(value, bool | str):
-            parts.append(f"{field} {brief(value)}")
-        elif isinstance(value, int):
-            parts.append(f"{field} {_constant(message, field, value)}")
-    return ", ".join(parts[:most])
+    return "" if message is None else fields_in_words(message)
 
 
 def result_lines(result: object) -> list[str]:
@@ -178,12 +161,13 @@ def result_lines(result: object) -> list[str]:
     import yaml
 
     from bt_actions.messages.conversion import to_plain
+    from bt_actions.messages.fields import constant_name
 
     text = yaml.safe_dump(_short(to_plain(result)), sort_keys=False, allow_unicode=True)
     lines = []
     for line in text.splitlines():
         field, _, written = line.partition(": ")
-        name = _constant(result, field, int(written)) if written.isdecimal() else written
+        name = constant_name(result, field, int(written)) if written.isdecimal() else written
         lines.append(f"  {line}" + (f"  # {name}" if name != written else ""))
     return lines
 
@@ -196,15 +180,3 @@ def _short(data: object) -> object:
         more = [f"… {len(data)} items"] if len(data) > MANY else []
         return [_short(item) for item in (data[:MOST] if more else data)] + more
     return brief(data) if isinstance(data, str) else data
-
-
-def _constant(message: object, field: str, value: int) -> str:
-    """The constant FIELD_X of the message's type that has `value`, as X; else the number."""
-    from bt_actions.messages.fields import constants
-
-    start = f"{field.upper()}_"
-    message_type: type = type(message)
-    for name, known in constants(message_type).items():
-        if name.startswith(start) and known == value:
-            return name.removeprefix(start)
-    return str(value)

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
+from bt_actions.utilities.shorten import fit
+
 NODE = "_bt_actions_node"
 LOADED = "_bt_actions_loaded"
 """The attribute of a behaviour that has the node it was made from, and that of a loaded root which
@@ -75,7 +77,7 @@ class Finding:
 
     def headline(self) -> str:
         """``trees/x.yaml:14:17: error[BT203]: MoveRobot.Goal has no field 'distnace'``"""
-        return f"{self.place}: {self.severity}[{self.code}]: {self.message}"
+        return f"{self.place}: {self.severity}[{self.code}]: {fit(self.message, 250)}"
 
     def __str__(self) -> str:
         return self.text()
@@ -86,9 +88,9 @@ class Finding:
         if self.source_line is not None:
             lines += _excerpt(self, width)
         if self.hint:
-            lines.append(f"  hint: {self.hint}")
+            lines.append(f"  hint: {fit(self.hint)}")
         if self.related is not None:
-            lines.append(f"  {self.related.place}: {self.related.message}")
+            lines.append(f"  {self.related.place}: {fit(self.related.message)}")
         return "\n".join(lines)
 
 

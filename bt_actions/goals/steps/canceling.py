@@ -81,7 +81,7 @@ def finished(goal: Facts) -> State:
 @leads_to()
 def cancel_answered(goal: Facts) -> None:
     """Take note of it: what counts is how the goal ends, or how long it is denied."""
-    goal.asking.answered(goal.detail, goal.steady)
+    goal.asking.cancel_answered(goal.detail, goal.steady)
 
 
 @leads_to(State.DONE)

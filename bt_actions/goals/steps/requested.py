@@ -130,7 +130,7 @@ def _denied_for_long(goal: Facts) -> State:
 @leads_to(State.NOT_RECEIVED)
 def denied_again(goal: Facts) -> State:
     """Let nobody wait for a goal that has been denied for 30 s."""
-    goal.asking.answered(goal.detail, goal.steady)
+    goal.asking.cancel_answered(goal.detail, goal.steady)
     if not goal.asking.in_vain:  # after its server was back, it was UNKNOWN until now
         goal.end = End.NEVER_STARTED
     return _denied_for_long(goal)
