@@ -189,8 +189,8 @@ def _decoded(node: Scalar, source: Source) -> list[Char]:
 def _found(node: Scalar, source: Source) -> list[Char]:
     """The characters of a text, looked for one after the other in what was written.
 
-    What is passed over is indentation, the second of two quotes, and whatever else says nothing. A
-    line break may stand for a space.
+    What is passed over is indentation, the second of two quotes, and whatever else says nothing.
+    A line break that is read as a space is found in the indentation behind it.
     """
     found: list[Char] = []
     content = _content_of(node, source)
@@ -209,7 +209,7 @@ def _found(node: Scalar, source: Source) -> list[Char]:
             at = escape.end() if escape else at + 1
             if at > len(written):
                 line, at = line + 1, 0
-            if there == char or (there == "\n" and char == " "):
+            if there == char:
                 break
             found.pop()
         else:
