@@ -11,10 +11,10 @@ from bt_actions.document.findings import (
     Finding,
     Place,
     Related,
+    Rule,
     Severity,
     Span,
 )
-from bt_actions.document.findings.rule import Rule
 from bt_actions.document.findings.rules import RULES
 from bt_actions.document.load import (
     Tree,

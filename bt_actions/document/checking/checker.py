@@ -68,7 +68,9 @@ def _parts(cls: type | None, interface: Interface) -> tuple[FieldType | None, Ty
     """The type of what is sent, and the root of expressions over what comes back."""
     if cls is None:
         return None, {interface.root: None}
-    return Message(interface.sent_by(cls)), {interface.root: Message(interface.received_from(cls))}
+    return Message(interface.part(cls, interface.sent)), {
+        interface.root: Message(interface.part(cls, interface.received))
+    }
 
 
 def _all_computed(
@@ -197,7 +199,11 @@ class Checker:
     def received(self, node: TreeNode) -> FieldType | None:
         """The type of what comes back to a node: a result, an answer, a message."""
         cls, interface = self.class_of(node), node.kind.interface
-        return None if cls is None or not interface else Message(interface.received_from(cls))
+        return (
+            None
+            if cls is None or not interface
+            else Message(interface.part(cls, interface.received))
+        )
 
     def declared_type(self, declared: Declared | None) -> FieldType | None:
         """The type of an input or an output; None where it has none, which is told there."""

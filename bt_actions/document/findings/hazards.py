@@ -1,11 +1,28 @@
-"""The rules about hazards, as in `rules.py`."""
+"""The rules about hazards, as in `rules.py`, and what many examples begin with."""
 
 from __future__ import annotations
 
 from functools import partial
 
-from bt_actions.document.findings import Severity
-from bt_actions.document.findings.rule import SUCCESS, Rule, moving, tree
+from bt_actions.document.findings import Rule, Severity
+
+MOVE = """\
+actions:
+  move:
+    type: robot_control_interfaces/action/MoveRobot
+    server: move_robot
+    timeout: 30 s
+"""
+SUCCESS = "root: {success: Done}\n"
+
+
+def tree(body: str) -> str:
+    return "tree: example\n" + body
+
+
+def moving(body: str) -> str:
+    return tree(MOVE + body)
+
 
 _warning = partial(Rule, severity=Severity.WARNING)
 HAZARDS = (

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from bt_actions.document.findings import Severity
-from bt_actions.document.findings.hazards import HAZARDS
-from bt_actions.document.findings.rule import MOVE, SUCCESS, Rule, moving, tree
+from bt_actions.document.findings import Rule, Severity
+from bt_actions.document.findings.hazards import HAZARDS, MOVE, SUCCESS, moving, tree
 
 _CAFE = r"printf 'tree: t\nroot: {success: Caf\351}\n' "
 _RULES = (

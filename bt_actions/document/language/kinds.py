@@ -85,13 +85,9 @@ class Interface:
     root: str = ""
     received: str = ""
 
-    def sent_by(self, cls: Any) -> Any:
-        """The message that is sent, of the interface's class."""
-        return getattr(cls, self.sent) if self.sent else cls
-
-    def received_from(self, cls: Any) -> Any:
-        """The message that comes back."""
-        return getattr(cls, self.received) if self.received else cls
+    def part(self, cls: Any, name: str) -> Any:
+        """The part of an interface's class; a message is its own."""
+        return getattr(cls, name) if name else cls
 
 
 @dataclass(frozen=True, slots=True)

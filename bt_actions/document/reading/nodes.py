@@ -413,6 +413,6 @@ def _fields_for(interface: Interface, inner: Listing, typed: Node) -> str | None
     with contextlib.suppress(ValueError):  # TypeNameError is one
         cls = interface_of(named.text, interface.kind)
         data = [None if is_computed(each) else data_of(each) for each in inner.items]
-        instead = as_fields(interface.sent_by(cls), data)
+        instead = as_fields(interface.part(cls, interface.sent), data)
         return f"write {instead}" if instead else None
     return None
