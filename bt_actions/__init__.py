@@ -22,8 +22,8 @@ if _TYPE_CHECKING:
     from bt_actions.goals.attempts import AttemptRecord
     from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
     from bt_actions.goals.unaccounted import GoalReport
-    from bt_actions.running.loop import TreeError
     from bt_actions.running.runner import TreeRunner
+    from bt_actions.running.telling import TreeError
 
 __all__ = [  # noqa: RUF022 - grouped by use
     # leaves
@@ -57,7 +57,7 @@ _PLACES = {
     "goals.attempts": ["AttemptRecord"],
     "goals.policy": ["Busy", "End", "Outcome", "Retry", "Timeouts"],
     "goals.unaccounted": ["GoalReport"],
-    "running.loop": ["TreeError"],
+    "running.telling": ["TreeError"],
     "running.runner": ["TreeRunner"],
 }
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}

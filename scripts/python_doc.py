@@ -77,7 +77,9 @@ with TreeRunner(root) as runner:
     runner.run()
 print(tree_outputs(root)["final_pose"])
 ```"""
-EVENTS = [events.TreeStarted, events.NodeChanged, events.GoalChanged, events.TreeFinished]
+EVENTS = [
+    getattr(events, name) for name in events.__all__ if isinstance(getattr(events, name), type)
+]
 EVENTS_HEAD = """\
 ## Events
 
@@ -92,7 +94,6 @@ BY_OURSELVES = {
     "ActionBehaviour.due_in",
     "ActionBehaviour.open_handles",
     "Retry.pause",
-    "TreeRunner.catch_up",
     "VirtualNetwork.publish",
     "VirtualNetwork.service",
     "VirtualNetwork.topic",

@@ -26,6 +26,7 @@ ROOMS = [
     {"ros"},
     {"traffic"},
     {"messages", "expressions", "servers"},
+    {"story"},
     {"events"},
     {"goals", "packages"},
     {"utilities"},

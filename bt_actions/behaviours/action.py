@@ -18,6 +18,9 @@ from py_trees.common import Status
 from bt_actions.behaviours.connected import Connected
 from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import reads_variables, resolve
+from bt_actions.events.kinds import AttemptEnded
+from bt_actions.events.snapshot import snapshot
+from bt_actions.events.teller import here
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.messages.conversion import MessageError, fill
@@ -150,6 +153,11 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         return history[-1].reason if (history := self.history) else ""  # of this visit alone
 
     @property
+    def expected(self) -> str:
+        """The condition that a result must meet, as it was written; or ""."""
+        return self._reading.wanted
+
+    @property
     def server(self) -> str:
         """The action's fully qualified name once set up, and until then as it was given."""
         return str(self._own.name) if self._own is not None else self.action_name
@@ -245,6 +253,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
                 return Status.RUNNING
             record = self._judge(handle, backend)
             again = not self._is_over() and self._attempts.again(record, backend.randomness)
+            self._tell(record, self._attempts.pause_left(backend.now()) if again else None)
             if self._is_over():
                 return Status.FAILURE
             if not again:
@@ -261,6 +270,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
             if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
                 outcome, reason = Outcome.CANCELED, reason or "interrupted by the tree"
             self.history.append(self._record(handle, outcome, reason, backend))
+            self._tell(self.history[-1], None)
             self.feedback_message = f"{outcome}: {reason}"
         self._outcome = self.history[-1].outcome  # also where it stops in the pause before a retry
 
@@ -291,6 +301,9 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         return [handle for handle in ours if handle is not None and not handle.is_over]
 
     # What a leaf for actions of one type may know better
+
+    tells_whole_result = False
+    """Whether a result is data for a caller, so that all of it is told, however large."""
 
     def names(self, result: Any) -> Mapping[str, object]:
         """Return what expressions may name, of a result; of None, with any value."""
@@ -361,6 +374,25 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         goal, begun, ended = handle.goal, handle.begun_at.ros, backend.now().ros
         goal.forget_message()
         return AttemptRecord(handle.attempt, outcome, reason, begun, ended, goal.result, goal)
+
+    def _tell(self, record: AttemptRecord, again_in: float | None) -> None:
+        """Tell the run what was made of an attempt."""
+        if (teller := here.get()) is None or not teller.is_heard:
+            return
+        unmet: dict[str, object] = {}
+        if record.outcome is Outcome.UNEXPECTED_RESULT:
+            unmet = self._reading.seen(record.result)
+        teller.tell(
+            AttemptEnded,
+            self,
+            record.goal_id,
+            record.attempt,
+            record.outcome,
+            record.reason,
+            self.expected if unmet else "",
+            {text: snapshot(value) for text, value in unmet.items()},
+            again_in,
+        )
 
     def _finish(self, record: AttemptRecord) -> Status:
         self._outcome = record.outcome

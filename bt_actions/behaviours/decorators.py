@@ -13,6 +13,9 @@ from py_trees.decorators import Decorator
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.connected import Timed
+from bt_actions.events.kinds import RoundBegan
+from bt_actions.events.snapshot import snapshot
+from bt_actions.events.teller import here
 from bt_actions.goals.policy import Retry
 from bt_actions.utilities.plain_data import plain
 from bt_actions.utilities.shorten import shorten
@@ -70,6 +73,9 @@ class Gate(Timed, Decorator):
         except ValueError as error:
             self.feedback_message, self.refused = str(error), True
             return Status.FAILURE
+        finally:
+            if (teller := here.get()) is not None:
+                teller.claim(self)
 
 
 class Deadline(Gate):
@@ -189,7 +195,7 @@ class Repeat(Gate):
         self._times = times
 
     def initialise(self) -> None:
-        self._done, self._of = 0, ""
+        self._done, self._of, self._told = 0, "", -1
         self._limit: int | None = None
         if self._times is None:
             return
@@ -205,7 +211,18 @@ class Repeat(Gate):
     def gate(self) -> Status | None:
         if self._limit == 0:
             return Status.SUCCESS
-        return None if self.left() <= 0.0 else Status.RUNNING
+        if self.left() > 0.0:
+            return Status.RUNNING
+        if self._told != self._done:
+            self._told = self._done
+            if (teller := here.get()) is not None and teller.is_heard:
+                teller.tell(RoundBegan, self, self._done, self._limit, snapshot(self.item))
+        return None
+
+    @property
+    def item(self) -> object:
+        """What the present round is about; None where rounds have but a number."""
+        return None
 
     def update(self) -> Status:
         status = self.decorated.status
@@ -284,6 +301,10 @@ class ForEach(Repeat):
         self._items, self._limit, self._of = items, len(items), f" of {len(items)}"
         if items:
             self._hand_over()
+
+    @property
+    def item(self) -> object:
+        return self._items[self._done]
 
     def update(self) -> Status:
         status = self.decorated.status

@@ -11,6 +11,8 @@ from collections.abc import Callable
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Leaf, Limited
+from bt_actions.events.kinds import Logged
+from bt_actions.events.teller import here
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.traffic.backend import LEVELS
@@ -105,4 +107,6 @@ class Log(Leaf):
             logging.getLogger("bt_actions").log(LEVELS[self._level], line)
         else:
             self._backend.log(self._level, line)
+        if (teller := here.get()) is not None:
+            teller.tell(Logged, self, self._level, line)
         return Status.SUCCESS

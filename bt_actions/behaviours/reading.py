@@ -13,7 +13,7 @@ from typing import Any
 
 from py_trees.blackboard import Blackboard, KeyMetaData
 
-from bt_actions.behaviours.variables import key, read
+from bt_actions.behaviours.variables import key, read, write
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.utilities.shorten import shorten
@@ -46,6 +46,10 @@ class Formula:
         """The expression as it was written."""
         return self.expression.text
 
+    def seen(self, given: Any) -> dict[str, object]:
+        """What stood for the names in it."""
+        return self.expression.seen(self.names(given), self.variable)
+
     def __call__(self, given: Any) -> Any:
         """The value; raises ExpressionError, and ValueError for one that does not fit."""
         if self.get is not None:
@@ -58,7 +62,7 @@ class Formula:
 class Reading:
     """The `expect` and `save` of a leaf, and the `retry.when` of an action."""
 
-    __slots__ = ("_expect", "_names", "_save", "_what", "_written", "when")
+    __slots__ = ("_expect", "_names", "_save", "_unmet", "_what", "_written", "wanted", "when")
 
     def __init__(
         self,
@@ -74,7 +78,9 @@ class Reading:
         """
         self._names, self._what = names, what
         self._written: list[tuple[str, Expression]] = []  # what was given as text
+        self._unmet = False
         self._expect = None if expect is None else self._function(expect, "expect")
+        self.wanted = str(getattr(self._expect, "text", ""))
         self.when = None if when is None else self._function(when, "retry.when")
         self._save = {key(name): self._function(place, "save") for name, place in save.items()}
 
@@ -110,17 +116,25 @@ class Reading:
                             return f"{what}: result has no field {name!r}{hint}"
         return ""
 
+    def seen(self, result: Any) -> dict[str, object]:
+        """What stood for the names in `expect`, where the result that was read last is not as
+        expected; else nothing."""
+        seen = getattr(self._expect, "seen", None)
+        return seen(result) if self._unmet and callable(seen) else {}
+
     def read(self, result: Any) -> str:
         """Check the result, and save what is to be kept of it; or return what is wrong with it."""
+        self._unmet = self._expect is not None
         try:
             if self._expect is not None and not self._expect(result):
-                wanted = getattr(self._expect, "text", "something else")
+                wanted = self.wanted or "something else"
                 return f"{wanted} was expected, but the {self._what} is: {shorten(result)}"
         except ExpressionError as error:
             return str(error)
+        self._unmet = False
         try:
             saved = [(name, value(result)) for name, value in self._save.items()]
         except ValueError as error:  # ExpressionError, or what is saved does not fit
             return str(error)
-        Blackboard.storage.update(saved)
+        write(dict(saved))
         return ""

@@ -67,6 +67,8 @@ class RunTree(ActionBehaviour):
             timeout = Timeouts(result=timeout, cancel=CANCEL)
         super().__init__(name, RUN_TREE, server, goal, timeout=timeout, **kwargs)
 
+    tells_whole_result = True
+
     def names(self, result: Any) -> Mapping[str, object]:
         """Return the result, and the outputs of the tree."""
         return roots_of(result)

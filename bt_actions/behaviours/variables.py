@@ -6,12 +6,14 @@ the blackboard is process-global and has no lock.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from py_trees.blackboard import Blackboard
+from py_trees.blackboard import ActivityItem, ActivityStream, ActivityType, Blackboard
 
+from bt_actions.events.teller import here
 from bt_actions.utilities.plain_data import numbers_only
 
 
@@ -61,6 +63,59 @@ def read(name: str) -> Any:
                 f"variable {name!r}: {step!r} is no field of a {type(value).__name__}"
             ) from None
     return value
+
+
+def write(values: Mapping[str, object]) -> None:
+    """Give variables their values, by their absolute keys, and tell the run of it."""
+    Blackboard.storage.update(values)
+    if (teller := here.get()) is not None:
+        for name, value in values.items():
+            teller.wrote(name, value)
+
+
+class _Overhearing(ActivityStream):
+    """Tells the run that ticks on this thread what a client of the blackboard writes.
+
+    py_trees has one such stream for all; what was there before is told, too.
+    """
+
+    runs = 0
+    """How many runs want to hear."""
+
+    def __init__(self, before: ActivityStream | None) -> None:
+        super().__init__(maximum_size=0)
+        self.before = before
+
+    def push(self, activity_item: ActivityItem) -> None:
+        """Take note of a client's activity (py_trees calls this)."""
+        if self.before is not None:
+            self.before.push(activity_item)
+        written = activity_item.activity_type in (
+            ActivityType.WRITE.value,
+            ActivityType.INITIALISED.value,
+        )
+        if written and (teller := here.get()) is not None:
+            teller.wrote(activity_item.key, activity_item.current_value)
+
+
+_overhearing = threading.Lock()
+
+
+def overhear() -> None:
+    """Have what clients of the blackboard write told to the runs that tick; see overhear_less."""
+    with _overhearing:
+        _Overhearing.runs += 1
+        if not isinstance(Blackboard.activity_stream, _Overhearing):
+            Blackboard.activity_stream = _Overhearing(Blackboard.activity_stream)
+
+
+def overhear_less() -> None:
+    """Undo one `overhear`."""
+    with _overhearing:
+        _Overhearing.runs -= 1
+        stream = Blackboard.activity_stream
+        if not _Overhearing.runs and isinstance(stream, _Overhearing):
+            Blackboard.activity_stream = stream.before
 
 
 def resolve(data: Any, value_of: Callable[[Var], Any] = Var.read) -> Any:

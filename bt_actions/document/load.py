@@ -42,6 +42,8 @@ class Loaded:
 
     document: Document
     scope: Scope
+    sources: dict[str, str]
+    """The texts of all files that it was made of, by path."""
 
 
 def _no_collecting(call: Callable[P, T]) -> Callable[P, T]:
@@ -182,7 +184,8 @@ def _built(
         except TooManyErrors:
             raise DocumentError(_errors(workspace)) from None
         _refuse(workspace)  # a class of one's own may fail when it is made
-    setattr(root, LOADED, Loaded(document, scope))
+    sources = {str(path): text for path, text in workspace.files.items()}
+    setattr(root, LOADED, Loaded(document, scope, sources))
     return root
 
 
@@ -210,6 +213,12 @@ def tree_name(root: Behaviour) -> str:
     """The name that its file gives a loaded tree; the root's own where no file made it."""
     loaded = getattr(root, LOADED, None)
     return loaded.document.name if isinstance(loaded, Loaded) else root.name
+
+
+def sources_of(root: Behaviour) -> dict[str, str]:
+    """The texts of the files that a loaded tree was made of, by path; none of a tree in Python."""
+    loaded = getattr(root, LOADED, None)
+    return dict(loaded.sources) if isinstance(loaded, Loaded) else {}
 
 
 def tree_outputs(root: Behaviour) -> dict[str, object]:

@@ -112,6 +112,34 @@ class Expression:
             )
         return value
 
+    def seen(
+        self, roots: Mapping[str, object], variable: Callable[[str], object]
+    ) -> dict[str, object]:
+        """What stands for each name in it, with the fields that are read of it, as it is written.
+
+        What has no value is left out. Raises nothing.
+        """
+        found: dict[str, object] = {}
+        waiting: list[ast.AST] = [self.tree]
+        while waiting:
+            node = waiting.pop()
+            inner = node
+            while isinstance(inner, ast.Attribute | ast.Subscript):
+                inner = inner.value
+            named = isinstance(inner, ast.Name) and (
+                inner.id in self.roots or self.variable_of(inner) is not None
+            )
+            if not named or not isinstance(node, ast.expr):
+                waiting.extend(reversed(list(ast.iter_child_nodes(node))))
+                continue
+            start, end = self.span(node)
+            text = self.text[start:end]
+            try:
+                found[text] = Expression(text, roots=self.roots).evaluate(roots, variable)
+            except ExpressionError:
+                continue
+        return found
+
     def span(self, node: ast.expr) -> tuple[int, int]:
         """Return the columns of a node of `tree` in `text`."""
         start, end = self.form.span(node)

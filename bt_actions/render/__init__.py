@@ -13,14 +13,13 @@ from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 
+from bt_actions.behaviours.kinds import action_of, kind
 from bt_actions.document import place_of
 from bt_actions.render.graphviz import RenderError, draw
 from bt_actions.render.look import (
     DOWN_UP_TO,
     Row,
-    action_of,
     direction_of,
-    kind,
     label,
     left_out,
     look,

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from py_trees.behaviour import Behaviour
 
+from bt_actions.behaviours.kinds import action_of
 from bt_actions.behaviours.variables import Var
 from bt_actions.goals.policy import Retry, Timeouts
 from bt_actions.messages import fields as ros_fields
 from bt_actions.messages.interfaces import PARTS, Kind, interface, interface_name, short_name
-from bt_actions.render.look import action_of
 
 if TYPE_CHECKING:
     from bt_actions.document.reading.tree import Document, TreeNode

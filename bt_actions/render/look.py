@@ -6,7 +6,6 @@ decorators and leaves). Draws and lays out nothing, never changes a tree, import
 
 from __future__ import annotations
 
-import re
 import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -15,34 +14,13 @@ from py_trees.behaviour import Behaviour
 from py_trees.composites import Composite, Parallel, Selector, Sequence
 from py_trees.decorators import Decorator
 
-from bt_actions.behaviours.parallel import Parallel as OwnParallel
+from bt_actions.behaviours.kinds import action_of, kind
 from bt_actions.utilities.plain_text import clean
 
 DOWN_UP_TO = 16
 """Leaves up to which a picture grows down, as py_trees draws; a wider one grows to the right."""
 
 _LABEL_WIDTH = 28
-_WORDS = {
-    "Sequence": "sequence",
-    "Selector": "fallback",
-    "Parallel": "parallel",
-    "Inverter": "invert",
-    "FailureIsSuccess": "force_success",
-    "SuccessIsFailure": "force_failure",
-    "OneShot": "run_once",
-    "Retry": "retry",
-    "Repeat": "repeat",
-    "Timeout": "timeout",
-    "Success": "success",
-    "Failure": "failure",
-    "Running": "running",
-    "ActionBehaviour": "action",
-    "CallService": "service",
-    "RunTree": "run_tree",
-    "Deadline": "timeout",
-    "RetryChild": "retry",
-    "SetValues": "set",
-}
 _LOOKS = (
     (Selector, "octagon", "#8ee3ea"),
     (Sequence, "box", "#ffc46b"),
@@ -88,37 +66,6 @@ def direction_of(nodes: Iterable[Row], direction: str | None = None) -> str:
     if direction is not None:
         return direction
     return "down" if sum(not row.node.children for row in nodes) <= DOWN_UP_TO else "right"
-
-
-def kind(node: Behaviour) -> str:
-    """Return what `node` is, in the words of the YAML language where it has one."""
-    word = type(node).__name__
-    for base in type(node).__mro__:
-        if base.__name__ in _WORDS and base.__module__.startswith(("py_trees.", "bt_actions.")):
-            word = _WORDS[base.__name__]
-            break
-        if base.__module__.startswith("bt_actions."):
-            word = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", base.__name__).lower()
-            break
-    if isinstance(node, Selector | Sequence) and not node.memory:
-        return f"reactive {word}"
-    if isinstance(node, OwnParallel):
-        some = "one" if node.at_least == 1 else f"at least {node.at_least}"
-        return f"{word}, {'all' if node.at_least is None else some}"
-    if isinstance(node, Parallel):
-        policy = type(node.policy).__name__.removeprefix("SuccessOn").lower()
-        return f"{word}, {policy}"
-    return word
-
-
-def action_of(node: Behaviour) -> tuple[str, str] | None:
-    """Return server and short type name of an action leaf, None for any other node."""
-    server = getattr(node, "server", None)
-    action_type = getattr(node, "action_type", None)
-    if not isinstance(server, str) or action_type is None:
-        return None
-    name = action_type if isinstance(action_type, str) else getattr(action_type, "__name__", "")
-    return server, str(name).rsplit("/", 1)[-1]
 
 
 def left_out(row: Row) -> str:

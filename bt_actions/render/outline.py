@@ -6,7 +6,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.composites import Composite, Parallel, Selector, Sequence
 from py_trees.decorators import Decorator
 
-from bt_actions.render.look import action_of, kind, left_out, rows
+from bt_actions.behaviours.kinds import action_of, kind
+from bt_actions.render.look import left_out, rows
 from bt_actions.utilities.plain_text import clean
 
 

@@ -23,10 +23,11 @@ from pathlib import Path
 
 from py_trees.behaviour import Behaviour
 
+from bt_actions.behaviours.kinds import action_of, kind
 from bt_actions.document import place_of
 from bt_actions.render.card import Table, describe, interface_of, tables
 from bt_actions.render.graphviz import RenderError
-from bt_actions.render.look import Row, action_of, direction_of, kind, label, look, rows
+from bt_actions.render.look import Row, direction_of, label, look, rows
 from bt_actions.render.outline import text
 from bt_actions.render.written import document_of, node_of, own_text
 from bt_actions.utilities.plain_text import clean

@@ -48,6 +48,8 @@ class RosHost:
         self._bell = threading.Condition(self.lock)
         self._thread: threading.Thread | None = None
 
+    wall = staticmethod(time.time)
+
     def domain(self, number: int) -> Domain:
         with self.lock:
             return self.domains.setdefault(number, Domain())

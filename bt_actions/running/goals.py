@@ -1,15 +1,17 @@
 """The goals of a tree's runs: which are its own, what is told of them, which are unaccounted for.
 
 A goal is the tree's where its leaf, wherever that is by now, was last ticked in one of its ticks.
-Changes are noted on any thread, and told on the one that ticks. Sends nothing.
+Changes are told on the thread on which they happen. Sends nothing.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from bt_actions.events import FeedbackCame, GoalChanged, ServerSeen
+from bt_actions.events.snapshot import snapshot
+from bt_actions.events.teller import OFTEN, Teller, here
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import State
 from bt_actions.goals.unaccounted import GoalReport, report_of
@@ -23,18 +25,18 @@ class RunGoals:
 
     def __init__(
         self,
-        emit: Callable[..., None],
+        teller: Teller,
         wake: Callable[[], None],
         changed: Callable[[], None],
+        steady: Callable[[], float],
     ) -> None:
-        """`emit` is called with what a GoalChanged is made of, `wake` where there is any.
+        """`wake` is called where there is reason to tick.
 
         `changed` is called, under the lock of the traffic, where one of ours has changed.
         """
-        self._emit, self._wake, self._changed = emit, wake, changed
-        self._run = Run(self._note)
-        self._changes: deque[tuple[GoalHandle, tuple[Any, ...]]] = deque()
-        self._handles: dict[GoalHandle, None] = {}  # in the order in which they began
+        self._teller, self._wake, self._changed, self._steady = teller, wake, changed, steady
+        self._run = Run(self._note, self._feedback, self._sight)
+        self._handles: dict[GoalHandle, _Told] = {}  # in the order in which they began
         self.run_goes_on = False
         """Between two runs only what earlier ones have left is of interest."""
         self.is_watched = True
@@ -42,10 +44,11 @@ class RunGoals:
 
     def begun_in(self, step: Callable[[], T]) -> T:
         """Return what `step` does; what it sets up and ticks is ours."""
-        before = ticking_run.set(self._run)
+        before, teller = ticking_run.set(self._run), here.set(self._teller)
         try:
             return step()
         finally:
+            here.reset(teller)
             ticking_run.reset(before)
 
     @property
@@ -68,18 +71,26 @@ class RunGoals:
             and (handle.goal.outcome is not None or not self.run_goes_on)
         ]
 
-    def close(self, now: float) -> None:
-        """Take note of nothing any more, and tell what has only now become known."""
+    def close(self) -> None:
+        """Take note of nothing any more."""
         self._run.notify = lambda handle: None
-        self.tell(now)
+        self._run.feedback = lambda handle, message: None
+        self._run.sight = lambda server, in_sight: None
+
+    def forget(self) -> None:
+        """Forget what is over."""
+        for done in [each for each in list(self._handles) if each.is_over]:
+            del self._handles[done]
+
+    # Under the lock of the traffic, on any thread
 
     def _note(self, handle: GoalHandle | None) -> None:
         if handle is not None:
             goal = handle.goal
             is_news = handle in self._handles  # else its leaf is just beginning it
-            self._handles[handle] = None
-            said = goal.state.shown, handle.attempt, goal.outcome, goal.end, goal.reason
-            self._changes.append((handle, (*said, goal.id.hex())))
+            told = self._handles.setdefault(handle, _Told())
+            if self._teller.is_heard:
+                self._tell(handle, told)
             self._changed()
             may_be_sent = is_news and goal.state is State.WAITING_FOR_SERVER
             if not (self.is_watched or may_be_sent or goal.outcome is not None):
@@ -88,13 +99,52 @@ class RunGoals:
             return
         self._wake()
 
-    def tell(self, now: float) -> None:
-        """Tell what was noted, and forget what is over."""
-        if not self._changes:
+    def _tell(self, handle: GoalHandle, told: _Told) -> None:
+        goal, values = handle.goal, {}
+        if goal.state is State.SENDING and goal.message is not None:
+            values["goal"] = snapshot(goal.message)
+        if goal.result is not None and not told.result:
+            told.result = True
+            whole = {"fields": 100_000, "size": 10_000_000} if _is_whole(handle.owner) else {}
+            values["result"] = snapshot(goal.result, **whole)
+        if goal.outcome is not None:
+            self._tell_feedback(handle, told)
+        said = goal.state.shown, goal.outcome, goal.end, goal.reason, goal.server
+        self._teller.tell(GoalChanged, handle.owner, goal.id.hex(), handle.attempt, *said, **values)
+
+    def _feedback(self, handle: GoalHandle, message: Any) -> None:
+        told = self._handles.get(handle)
+        if told is None or not self._teller.is_heard:
             return
-        while self._changes:
-            handle, change = self._changes.popleft()
-            if handle.owner is not None:  # else its leaf was thrown away since
-                self._emit(now, handle.owner, *change)
-        for done in [each for each in list(self._handles) if each.is_over]:
-            del self._handles[done]
+        told.feedback = snapshot(message) if handle.keeps_feedback else message
+        now = self._steady()
+        if now - told.at >= OFTEN:
+            told.at = now
+            self._tell_feedback(handle, told)
+
+    def _sight(self, server: str, in_sight: bool) -> None:
+        self._teller.stream.add(ServerSeen, server, in_sight)
+
+    def _tell_feedback(self, handle: GoalHandle, told: _Told) -> None:
+        """Tell the latest that was not told yet."""
+        message, told.feedback = told.feedback, None
+        if message is not None:
+            self._teller.tell(FeedbackCame, handle.owner, handle.goal.id.hex(), snapshot(message))
+
+
+class _Told:
+    """What was told of one goal."""
+
+    __slots__ = ("at", "feedback", "result")
+
+    def __init__(self) -> None:
+        self.result = False
+        self.at = float("-inf")
+        """When feedback was told."""
+        self.feedback: Any = None
+        """The latest that was not told; a snapshot where a leaf's `on_feedback` may change it."""
+
+
+def _is_whole(leaf: Any) -> bool:
+    """Whether the result of a leaf is data for a caller, who gets all of it."""
+    return bool(getattr(leaf, "tells_whole_result", False))

@@ -9,6 +9,7 @@ thread, no wait, no ROS: a thread steps it, or a test in virtual time.
 from __future__ import annotations
 
 import math
+import sys
 import weakref
 from collections.abc import Callable
 from numbers import Real
@@ -19,9 +20,11 @@ from py_trees.common import Duration, Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.events import Event, GoalChanged, NodeChanged, Observer, TreeFinished, TreeStarted
+from bt_actions.events import Event, Observer, Paused
+from bt_actions.events.stream import Reader
 from bt_actions.messages.interfaces import TwoTypes
 from bt_actions.running.goals import RunGoals
+from bt_actions.running.telling import TreeError, TreeTeller, UnusableTree
 from bt_actions.running.ticking import QUIET_REST, ChangeVisitor, Misbehaviour, tick_once
 from bt_actions.running.watchdog import Watchdog
 from bt_actions.traffic.drain import Drain, drain
@@ -32,16 +35,10 @@ from bt_actions.wiring import backend_of
 
 BURST = 1000
 """Ticks in a row, at most, while each changes a status."""
+SLOW = 0.05
+"""Seconds for one event from which on an observer is said to be slow."""
 LONGEST_WAIT = 3600.0
 """Seconds, at most, between two looks at the tree, whatever the heartbeat is."""
-
-
-class TreeError(Exception):
-    """A behaviour raised or had no status, or the spin thread died; the goals have been drained."""
-
-
-class UnusableTree(TreeError):
-    """The tree cannot be set up as it is given, whatever the world does."""
 
 
 def check_seconds(timeout: float | None) -> None:
@@ -85,12 +82,20 @@ class TickLoop:
             misbehaved: is asked after each behaviour's tick what that did wrong.
         """
         self.tree, self._heartbeat = tree, heartbeat
-        self._traffic, self._node, self._wake = backend_of(node).traffic, node, wake
+        self._backend = backend_of(node)
+        self._traffic, self._node, self._wake = self._backend.traffic, node, wake
         self._log = self._traffic.host.log
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
+        self.teller = TreeTeller(tree, self._backend)
         self._observers: list[Observer] = []
+        self._slow: list[Observer] = []
+        """Those of which that was said."""
+        self._observed: Reader | None = None
         self.goals = RunGoals(
-            self._tell_of_goal, wake, lambda: self._traffic.host.scheduler.add(self.watchdog)
+            self.teller,
+            wake,
+            lambda: self._traffic.host.scheduler.add(self.watchdog),
+            self._traffic.host.steady,
         )
         self.watchdog = Watchdog(self._traffic, self.goals)
         self._nodes = set[Behaviour]()  # of the tree, and set up
@@ -110,6 +115,8 @@ class TickLoop:
     def observe(self, callback: Observer) -> None:
         """Call `callback` with each event, in the step; one that raises is removed."""
         self._observers.append(callback)
+        if self._observed is None:
+            self._observed = self.teller.stream.reader(room=sys.maxsize)
 
     # What anybody may ask for, on any thread
 
@@ -137,7 +144,8 @@ class TickLoop:
         self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
         self._error = self._drain = None
         self._status, self._burst = Status.INVALID, 0
-        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each)
+        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each, self.teller.changed)
+        self.teller.begin()
         self.goals.run_goes_on = True
         self.watchdog.begin(self._deadline)
 
@@ -155,7 +163,7 @@ class TickLoop:
                     return Sleep(seconds)
             except BaseException as error:  # noqa: BLE001 - raised again after the drain
                 self.fail(error)
-            self._drain = self._stop()
+            self._drain = self.goals.begun_in(self._stop)
         return self._wind_up(self._drain)
 
     def fail(self, error: BaseException) -> None:
@@ -170,6 +178,7 @@ class TickLoop:
         self._error, self._status = error, Status.INVALID
 
     def _rest(self) -> None:
+        self.teller.rest()
         with self._traffic.host.lock:
             self._stop_wanted = self._abandoned = self._pause_wanted = False
             self.goals.run_goes_on = False
@@ -182,11 +191,11 @@ class TickLoop:
             self.tree.visitors.append(self._visitor)
             self._guarded(self._set_up_missing)
             self._ready()
-            self._emit(TreeStarted(self._now))
+            self.teller.began()
         self._check()
         if self.is_to_end(self._now):
             return None
-        self.goals.tell(self._now)
+        self._tell_observers()
         rest = self._heartbeat
         if not self._held():
             goes_on = self._tick() and (self._visitor.may_go_on or self._has_others)
@@ -227,6 +236,7 @@ class TickLoop:
             self._left.update(self._nodes - now)
             self._visitor.forget_others(now)
             self._nodes, self._with_children, self._doing = now, found, "tick"
+            self.teller.added()
 
     def _is_as_found(self) -> bool:
         """Whether the tree is as it was set up; takes about 10 ns a behaviour."""
@@ -241,8 +251,7 @@ class TickLoop:
             pass
         finally:
             changed = self._visitor.finish()
-            self.goals.tell(self._now)
-            self._tell(changed)
+            self._tell_observers()
         return bool(changed)
 
     def _after_each(self) -> str:
@@ -272,6 +281,7 @@ class TickLoop:
         """Whether the tree is paused; carries a change of that over to goals not sent yet."""
         if self._pause_wanted != self._paused:
             self._paused = self._pause_wanted
+            self.teller.stream.add(Paused, self._paused)
             self._traffic.pause(self.goals.not_over, self._paused)
         return self._paused
 
@@ -295,7 +305,6 @@ class TickLoop:
             self.tree.visitors.remove(self._visitor)
         self._pause_wanted = False
         self._held()
-        self.goals.tell(self._now)  # a goal may have begun in a tick that raised
         root = self.tree.root
         if any(node.status is Status.RUNNING for node in root.iterate()):  # not the root, then
             try:
@@ -320,12 +329,13 @@ class TickLoop:
     def _wind_up(self, drain: Drain) -> Sleep | Done[Status]:
         """Drain the tree's goals, and tell."""
         step = drain.step(self._now, hurry=self._abandoned)
-        self.goals.tell(self._now)
+        self._tell_observers()
         if isinstance(step, Sleep):
             return step
-        self._tell(self._visitor.stopped())
+        self._visitor.stopped()
         self._log.flush()  # who tells of the end tells it last
-        self._emit(TreeFinished(self._now, self._status))
+        self.teller.finished(self._status, self._error, self.goals.unaccounted)
+        self._tell_observers()
         timed_out = self._status is Status.INVALID and not self._stop_wanted
         self._rest()
         self.raise_what_ended_it()
@@ -341,6 +351,11 @@ class TickLoop:
                 raise error
         finally:
             del error
+
+    def close(self) -> None:
+        """Tell what has only now become known of goals; nothing is told after that."""
+        self.goals.close()
+        self._tell_observers()
 
     def shutdown(self) -> None:
         """Shut down the tree, and what was pruned, if set up here: else another one may run it."""
@@ -359,21 +374,27 @@ class TickLoop:
 
     # Who is told
 
-    def _tell(self, changes: dict[Behaviour, Status]) -> None:
-        for node, status in changes.items() if self._observers else ():
-            self._emit(NodeChanged(self._now, path_of(node), node, status, node.feedback_message))
-
-    def _tell_of_goal(self, *change: Any) -> None:
-        if self._observers:
-            self._emit(GoalChanged(*change))
+    def _tell_observers(self) -> None:
+        """Call the observers with what has happened; forget the goals that are over."""
+        self.goals.forget()
+        for event in self._observed.take() if self._observed is not None else ():
+            self._emit(event)
 
     def _emit(self, event: Event) -> None:
+        steady = self._traffic.host.steady
         for observer in list(self._observers):
+            began = steady()
             try:
                 observer(event)
             except BaseException as error:  # noqa: BLE001 - the run goes on without it
                 self._observers.remove(observer)
                 self._raised("an observer raised and was removed", error)
+            if (took := steady() - began) > SLOW and observer not in self._slow:
+                self._slow.append(observer)
+                self._log.warning(
+                    f"an observer has taken {took:.2f} s for one event; the tree waits for it: "
+                    "read `runner.stream` on a thread of your own instead"
+                )
 
     def _raised(self, what: str, error: BaseException) -> None:
         """Log it, and end the run where it is meant to end the program, as SystemExit is."""

@@ -21,8 +21,10 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions import wiring
 from bt_actions.events import Observer
+from bt_actions.events.stream import Stream
 from bt_actions.goals.unaccounted import GoalReport
-from bt_actions.running.loop import TickLoop, TreeError, check_seconds
+from bt_actions.running.loop import TickLoop, check_seconds
+from bt_actions.running.telling import TreeError
 from bt_actions.running.threads import StartedRun, WakeUp
 from bt_actions.utilities.places import path_of, root_of
 from bt_actions.utilities.plain_text import raised
@@ -122,6 +124,11 @@ class TreeRunner:
     def unaccounted(self) -> list[GoalReport]:
         """The goals of this tree whose end is UNKNOWN, by now."""
         return self._loop.goals.unaccounted
+
+    @property
+    def stream(self) -> Stream:
+        """The events of all runs, for readers on threads of their own."""
+        return self._loop.teller.stream
 
     @property
     def running(self) -> bool:
@@ -285,14 +292,6 @@ class TreeRunner:
         """
         self._loop.interrupt(time.monotonic(), abandon=abandon)
 
-    def catch_up(self) -> None:
-        """Tell the observers, on this thread, what became of goals since a tick does not return.
-
-        For who leaves without waiting for it; does nothing unless the run was to end by then.
-        """
-        if self._loop.watchdog.gave_up:
-            self._loop.goals.tell(time.monotonic())
-
     def shutdown(self) -> None:
         """End the run if there is one, and shut down the tree and all that was made here.
 
@@ -336,7 +335,7 @@ class TreeRunner:
                 self._started.join()
             guests = self._close_guests if self._on_close else None
             with contextlib.ExitStack() as last:
-                last.callback(lambda: self._loop.goals.close(time.monotonic()))
+                last.callback(self._loop.close)
                 last.callback(self._spinner.stop, self._wake_up.set, guests)
                 self._loop.shutdown()
             self._log.flush()  # what was said is written, whatever becomes of the process

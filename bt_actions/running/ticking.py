@@ -68,17 +68,21 @@ class ChangeVisitor(VisitorBase):
         self,
         before: Callable[[], None],
         after_each: Callable[[], str],
+        tell: Callable[[Behaviour], None] = lambda behaviour: None,
     ) -> None:
         """`before` is called between the handlers of a tick and its first behaviour.
 
         `after_each` is called when a behaviour has ticked, and what it returns is its misbehaviour.
+        `tell` is called then, where its status is another or its visit ends, and for what was
+        stopped.
         """
         super().__init__(full=False)
-        self._before, self._after_each = before, after_each
+        self._before, self._after_each, self._tell = before, after_each, tell
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
         self._kinds = {Behaviour}  # of what was visited: anything, for a tree that shows nothing
         self._known: dict[Behaviour, Status] = {}
+        self._live: dict[Behaviour, None] = {}  # told of as RUNNING
 
     def initialise(self) -> None:
         """Begin a tick (py_trees calls this)."""
@@ -96,6 +100,7 @@ class ChangeVisitor(VisitorBase):
         and goes on with its parent. Nothing else leaves that after a tick.
         """
         after_each, visited, none = self._after_each, self._visited, Status.INVALID
+        live, running, tell = self._live, Status.RUNNING, self._tell
         for behaviour in ticked:
             for visitor in others:
                 behaviour.visit(visitor)
@@ -106,6 +111,12 @@ class ChangeVisitor(VisitorBase):
                 )
                 raise Misbehaviour(behaviour, what)
             visited.append(behaviour)
+            if status is not running:
+                live.pop(behaviour, None)
+                tell(behaviour)
+            elif behaviour not in live:
+                live[behaviour] = None
+                tell(behaviour)
             if wrong := after_each():
                 raise Misbehaviour(behaviour, wrong)
 
@@ -126,11 +137,18 @@ class ChangeVisitor(VisitorBase):
             stopped = [n for n in before if n not in seen and known.get(n) is Status.RUNNING]
             self._kinds = {type(node) for node in visited}
             self._visited_before = visited
+        self._tell_stopped()
         return self._changes(stopped + visited)
 
     def stopped(self) -> dict[Behaviour, Status]:
         """Return the changes of what was last known to run."""
+        self._tell_stopped()
         return self._changes([n for n, s in self._known.items() if s is Status.RUNNING])
+
+    def _tell_stopped(self) -> None:
+        for node in [each for each in self._live if each.status is not Status.RUNNING]:
+            del self._live[node]
+            self._tell(node)
 
     def _changes(self, nodes: list[Behaviour]) -> dict[Behaviour, Status]:
         known = self._known

@@ -9,11 +9,13 @@ from bt_actions_interfaces.msg import ActionReport, Finding, TreeInfo, TreeInput
 from builtin_interfaces.msg import Duration
 from unique_identifier_msgs.msg import UUID
 
+from bt_actions.goals.policy import End
 from bt_actions.serving.catalog import Entry
-from bt_actions.serving.outcome import ActionOutcome, RunOutcome
+from bt_actions.serving.outcome import ENDS, OUTCOMES, SEPARATOR, RunOutcome
 from bt_actions.serving.requests import Said
 from bt_actions.serving.run import Run
 from bt_actions.serving.story import warnings_of
+from bt_actions.story.actions import ActionStory
 from bt_actions.utilities.plain_text import as_json
 
 
@@ -24,7 +26,7 @@ def result(outcome: RunOutcome) -> RunTree.Result:
         error_msg=outcome.message,
         outputs=outcome.outputs,
         settled=outcome.settled,
-        actions=[_action(each) for each in outcome.actions],
+        actions=[_action(each, outcome.at) for each in outcome.actions],
     )
 
 
@@ -70,8 +72,15 @@ def info(entry: Entry, goals: Iterable[tuple[UUID, Run, bool]]) -> TreeInfo:
     )
 
 
-def _action(each: ActionOutcome) -> ActionReport:
-    whole, rest = divmod(each.duration, 1)
-    duration = Duration(sec=int(whole), nanosec=int(rest * 1e9))
-    few = {"attempts": min(each.attempts, 65535), "duration": duration}
-    return ActionReport(**each._asdict() | few)
+def _action(action: ActionStory, now: float) -> ActionReport:
+    duration = action.seconds(now)
+    return ActionReport(
+        path=SEPARATOR.join(action.path),
+        server=action.server,
+        attempts=min(action.attempts, 65535),
+        outcome=0 if action.outcome is None else OUTCOMES[action.outcome],
+        end=ENDS[End.UNKNOWN if action.end is None else action.end],
+        reason=action.reason,
+        duration=Duration(sec=int(duration), nanosec=int(duration % 1.0 * 1e9)),
+        place=action.node.place,
+    )

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.report import Report, Row
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.state import State
+from bt_actions.story.why import causes
 from bt_actions.utilities.plain_text import clean
 
 SEPARATOR = " / "
@@ -56,19 +57,6 @@ class Ending(enum.Enum):
     SERVER_ENDS = (Code.DEACTIVATED, "its server ends")
 
 
-class ActionOutcome(NamedTuple):
-    """The end of one action; see ActionReport.msg."""
-
-    path: str
-    server: str
-    attempts: int
-    outcome: int
-    end: int
-    reason: str
-    duration: float
-    place: str
-
-
 @dataclass(frozen=True, slots=True)
 class RunOutcome:
     """The answer to a RunTree goal; see RunTree.action."""
@@ -77,7 +65,9 @@ class RunOutcome:
     message: str = ""
     outputs: str = "{}"
     unaccounted: tuple[str, ...] = ()
-    actions: tuple[ActionOutcome, ...] = ()
+    actions: tuple[ActionStory, ...] = ()
+    at: float = 0.0
+    """When the run ended, in seconds on the steady clock."""
 
     @property
     def settled(self) -> bool:
@@ -91,7 +81,7 @@ class RunOutcome:
 
 
 def outcome_of(
-    report: Report,
+    state: State,
     *,
     succeeded: bool,
     ending: Ending | None = None,
@@ -112,7 +102,7 @@ def outcome_of(
     elif ending is not None:
         code, lines = ending.value[0], [ending.value[1]]
     else:
-        code, lines = _failure(report)
+        code, lines = _failure(state)
     left = list(unaccounted or ())
     if left:
         code = Code.UNKNOWN if succeeded else code
@@ -122,37 +112,17 @@ def outcome_of(
         "\n".join(lines)[:_MOST_TEXT],
         outputs,
         tuple(left),
-        tuple(_action(report, row) for row in report.rows),
+        tuple(state.actions),
+        state.latest,
     )
 
 
-def _failure(report: Report) -> tuple[int, list[str]]:
-    """Return the first action that is to blame, and the chain of failures, first cause first."""
-    culprits = report.culprits()
-    chain = sorted(culprits, key=lambda each: each.row is None)
+def _failure(state: State) -> tuple[int, list[str]]:
+    """The first action that is to blame, and the chain, it first."""
+    chain = sorted(state.failures, key=lambda each: each.action is None)
     code: int = Code.TREE_FAILED
     for each in chain:
-        if each.row is not None and each.row.outcome is not None:
-            code = Code.ACTION_FAILED + OUTCOMES[each.row.outcome]
+        if each.action is not None and each.action.outcome is not None:
+            code = Code.ACTION_FAILED + OUTCOMES[each.action.outcome]
             break
-    lines = []
-    for each in chain:
-        said = each.message
-        if each.row is not None and each.row.outcome is not None:
-            said = f"{each.row.outcome}: {each.row.reason or said}"
-        place = f" ({each.place})" if each.place else ""
-        lines.append(f"{SEPARATOR.join(each.path)}: {said or 'failed'}{place}")
-    return code, lines or ["the tree failed"]
-
-
-def _action(report: Report, row: Row) -> ActionOutcome:
-    return ActionOutcome(
-        SEPARATOR.join(row.path),
-        row.server,
-        row.attempts,
-        0 if row.outcome is None else OUTCOMES[row.outcome],
-        ENDS[End.UNKNOWN if row.end is None else row.end],
-        row.reason,
-        row.seconds(report.now),
-        row.place,
-    )
+    return code, causes(state) or ["the tree failed"]

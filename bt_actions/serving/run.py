@@ -10,8 +10,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from bt_actions_interfaces.msg import RunningLeaf
-from py_trees.behaviour import Behaviour
-from py_trees.behaviours import Failure
 from py_trees.common import Status
 
 from bt_actions.behaviours.action import ActionBehaviour
@@ -19,10 +17,10 @@ from bt_actions.document import Tree, tree_outputs
 from bt_actions.events import Event, NodeChanged
 from bt_actions.messages.conversion import to_plain
 from bt_actions.ros.naming import server_name
-from bt_actions.running.report import Report
 from bt_actions.running.runner import TreeRunner
 from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
-from bt_actions.utilities.places import path_of
+from bt_actions.story.state import OVER, NodeStory, State
+from bt_actions.story.words import doing_text
 from bt_actions.utilities.plain_text import as_json
 
 SHOWN = 3
@@ -59,7 +57,7 @@ class Run:
         """No new goal is begun."""
         self.ending: Ending | None = None
         self.leaves_ended = 0
-        self._running: dict[Behaviour, None] = {}
+        self._state = State()
         self.changes = 0
         """How often something has changed that is told of while it runs."""
         self._thread = threading.Thread(target=self._run, name=f"bt_actions-serve-{tree.name}")
@@ -94,15 +92,26 @@ class Run:
         return not self._thread.is_alive()
 
     def running(self) -> list[RunningLeaf]:
-        """Return the leaves that run, deepest first; on any thread."""
-        paths = [(path_of(leaf), leaf) for leaf in list(self._running)]
-        paths.sort(key=lambda each: -len(each[0]))
-        return [_leaf(path, leaf) for path, leaf in paths[:SHOWN]]
+        """The leaves that run, deepest first; on any thread."""
+        with self._lock:
+            return [self._leaf(each) for each in self._state.running[:SHOWN]]
 
     def retrying(self) -> bool:
-        """Return whether an action that runs is not at its first attempt; on any thread."""
-        leaves = list(self._running)
-        return any(isinstance(each, ActionBehaviour) and each.attempt > 1 for each in leaves)
+        """Whether an action that runs is not at its first attempt; on any thread."""
+        with self._lock:
+            state = self._state
+            return any(
+                state.acts(each.node.id) and state.action(each.node.id).attempt > 1
+                for each in state.running
+            )
+
+    def _leaf(self, story: NodeStory) -> RunningLeaf:
+        path = SEPARATOR.join(self._state.path(story.node.id))
+        told = RunningLeaf(path=path, message=doing_text(story, self._state))
+        if self._state.acts(story.node.id):
+            action = self._state.action(story.node.id)
+            told.attempt, told.attempts = action.attempt, action.of
+        return told
 
     # On the run's thread
 
@@ -110,17 +119,15 @@ class Run:
         try:
             outcome = self._to_end()
         except BaseException as error:  # noqa: BLE001 - whoever asked for it must be answered
-            outcome = outcome_of(Report(Failure("nothing")), succeeded=False, error=error)
+            outcome = outcome_of(State(), succeeded=False, error=error)
         self._ended(outcome)
 
     def _to_end(self) -> RunOutcome:
         root = self.tree.build(self._inputs)
         leaves = [each for each in root.iterate() if isinstance(each, ActionBehaviour)]
         self._begins({server_name(self._node, each.action_name) for each in leaves})
-        report = Report(root)
         status, error = Status.INVALID, None
         runner = TreeRunner(root, node=self._node)
-        runner.observe(report.observe)
         runner.observe(self._note)
         try:
             with self._lock:
@@ -145,7 +152,7 @@ class Run:
             except Exception as raised:  # noqa: BLE001 - a python: node may write anything
                 status, error = Status.INVALID, raised
         return outcome_of(
-            report,
+            self._state,
             succeeded=status is Status.SUCCESS,
             ending=None if status is Status.FAILURE else self.ending,
             error=error,
@@ -154,18 +161,8 @@ class Run:
         )
 
     def _note(self, event: Event) -> None:
-        if not isinstance(event, NodeChanged) or event.node.children:
-            return
-        if event.status is Status.RUNNING:
-            self._running[event.node] = None
-        else:
-            self._running.pop(event.node, None)
-            self.leaves_ended += event.status is not Status.INVALID
-        self.changes += 1
-
-
-def _leaf(path: tuple[str, ...], leaf: Behaviour) -> RunningLeaf:
-    told = RunningLeaf(path=SEPARATOR.join(path), message=leaf.feedback_message)
-    if isinstance(leaf, ActionBehaviour):
-        told.attempt, told.attempts = leaf.attempt, leaf.retry.attempts
-    return told
+        with self._lock:
+            self._state.observe(event)
+            if isinstance(event, NodeChanged) and self._state.nodes[event.node].is_leaf:
+                self.leaves_ended += event.status in OVER
+                self.changes += 1

@@ -41,6 +41,8 @@ class VirtualHost:
     def steady(self) -> float:
         return self._timeline.now
 
+    wall = steady
+
     def new_goal_id(self) -> bytes:
         return self.randomness.randbytes(16)
 

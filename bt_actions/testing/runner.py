@@ -11,15 +11,15 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
-from bt_actions.events import GoalChanged
+from bt_actions.events import AttemptEnded
 from bt_actions.running.loop import TickLoop
+from bt_actions.story.state import State
 from bt_actions.testing.backend import VirtualBackend
 from bt_actions.testing.network import VirtualNetwork
 from bt_actions.utilities.stepping import Done, Sleep
 
 if TYPE_CHECKING:
     from bt_actions.events import Event, Observer
-    from bt_actions.goals.attempts import AttemptRecord
     from bt_actions.goals.policy import Outcome
     from bt_actions.goals.unaccounted import GoalReport
 
@@ -50,8 +50,10 @@ class VirtualRunner:
         self.backend = VirtualBackend(self.network, seed=seed)
         self.events: list[Event] = []
         """What happened in all runs; times are virtual."""
-        self._histories: dict[str, list[AttemptRecord]] = {}
-        """Of each goal: where its leaf files what becomes of it."""
+        self.state = State()
+        """Where the latest run stands, or how it ended."""
+        self.outcomes: list[tuple[str, Outcome]] = []
+        """Of each attempt that is over, in that order: the leaf, and what it says of it."""
         self._woken = self._goes_on = False
         self._status: Status | None = None
         """None before the first run."""
@@ -70,17 +72,6 @@ class VirtualRunner:
     def now(self) -> float:
         """The virtual time in seconds."""
         return self.network.timeline.now
-
-    @property
-    def outcomes(self) -> list[tuple[str, Outcome]]:
-        """Of each attempt that is over, in that order: the leaf, and what it says of it."""
-        ended: dict[str, tuple[str, Outcome]] = {}
-        for event in self.events:
-            if isinstance(event, GoalChanged) and event.outcome is not None:
-                filed = {each.goal_id: each.outcome for each in self._histories[event.goal_id]}
-                outcome = filed.get(event.goal_id, event.outcome)
-                ended.setdefault(event.goal_id, (event.behaviour.name, outcome))
-        return list(ended.values())
 
     @property
     def unaccounted(self) -> list[GoalReport]:
@@ -161,13 +152,13 @@ class VirtualRunner:
         self._loop.shutdown()
         self.network.arrive()
         self.backend.traffic.destroy()
-        self._loop.goals.close(self.now)
+        self._loop.close()
 
     def _note(self, event: Event) -> None:
         self.events.append(event)
-        if isinstance(event, GoalChanged):
-            history: list[AttemptRecord] = getattr(event.behaviour, "history", [])
-            self._histories.setdefault(event.goal_id, history)
+        self.state.observe(event)
+        if isinstance(event, AttemptEnded):
+            self.outcomes.append((self.state.nodes[event.node].node.name, event.outcome))
 
     def _wake(self) -> None:
         self._woken = True

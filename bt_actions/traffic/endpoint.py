@@ -61,6 +61,8 @@ class ActionEndpoint(Endpoint):
         now = self.heard_at = self.watch.heard_at = self.host.steady()
         handle.replies.spoke(self.watch, now)
         tell(handle, Event.FEEDBACK, feedback)
+        if handle.run is not None:
+            handle.run.feedback(handle, feedback)
         if handle.keeps_feedback and handle.goal.outcome is None:
             handle.feedback.append(feedback)
             wake([handle])

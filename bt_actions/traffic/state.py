@@ -146,6 +146,9 @@ class Host(Protocol):
     def steady(self) -> float:
         """Return seconds that only ever go forward."""
 
+    def wall(self) -> float:
+        """Return seconds since 1970 on the computer's clock."""
+
     def new_goal_id(self) -> bytes:
         """Return 16 bytes that no goal has had."""
 
@@ -414,6 +417,10 @@ class Run:
     notify: Callable[[GoalHandle | None], None]
     """Takes note, on any thread and under the lock, of a goal of its that has a new state, outcome
     or end; of None: there is reason to tick."""
+    feedback: Callable[[GoalHandle, Any], None] = lambda handle, message: None
+    """Takes note, likewise, of feedback of a goal of its."""
+    sight: Callable[[str, bool], None] = lambda server, in_sight: None
+    """Takes note, likewise, that the server of one of its goals has come in sight, or gone."""
 
 
 ticking_run: ContextVar[Run | None] = ContextVar("ticking_run", default=None)

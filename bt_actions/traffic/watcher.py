@@ -124,6 +124,11 @@ def look(endpoint: Endpoint, now: float) -> Server:
     if state is not before:
         endpoint.domain.ever_lost_sight |= state is Server.ABSENT
         endpoint.domain.known.add(endpoint.action)
+        is_there = state is not Server.ABSENT
+        if is_there is (before is Server.ABSENT):
+            for run in {handle.run: None for handle in endpoint.handles}:
+                if run is not None:
+                    run.sight(endpoint.name, is_there)
         if state is Server.AMBIGUOUS:
             host.log.warning(
                 f"{endpoint.name}: two action servers answer to this name; no more is sent"

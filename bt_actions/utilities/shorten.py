@@ -1,6 +1,7 @@
 """Any value as one short text for people, in time that does not grow with the value.
 
-No ROS here: a message is recognised by what it can do. Nothing is made a text as a whole first.
+No ROS here: a message is recognised by what it can do, and what was cut (events/snapshot.py) by
+`head` and `more`. Nothing is made a text as a whole first.
 """
 
 from __future__ import annotations
@@ -92,7 +93,8 @@ def _parts(value: object) -> Iterator[Part] | None:
     is_bytes = isinstance(value, bytes | bytearray) and len(value) != 1  # one is a byte of ROS
     if isinstance(value, list | tuple) or is_array or is_bytes:
         return _listed(value)  # type: ignore[arg-type]
-    return None
+    more = getattr(value, "more", None)
+    return _cut(value.head, more) if isinstance(more, int) else None  # type: ignore[attr-defined]
 
 
 def _braced(members: Iterator[Part]) -> Iterator[Part]:
@@ -102,9 +104,18 @@ def _braced(members: Iterator[Part]) -> Iterator[Part]:
     yield "}", _NOTHING
 
 
-def _listed(items: list[object]) -> Iterator[Part]:
-    size = len(items)
-    shown = size if size <= _ALL else _FIRST
+def _cut(head: object, more: int) -> Iterator[Part] | None:
+    """The beginning of a value, of which so much more follows."""
+    if isinstance(head, str):
+        return iter(((repr(f"{head}…"), _NOTHING),))
+    if isinstance(head, Mapping):
+        return _parts({**head, "…": f"{more} more"})
+    return _listed(head, more)  # type: ignore[arg-type]
+
+
+def _listed(items: list[object], more: int = 0) -> Iterator[Part]:
+    size = len(items) + more
+    shown = size if size <= _ALL else min(_FIRST, len(items))
     yield "[", _NOTHING
     for at in range(shown):
         yield ", " if at else "", item_of(items, at)

@@ -120,9 +120,7 @@ def test_a_failure_is_told_on_rosout_with_its_reason_and_is_printed_once(
     _, reason, ends = watcher.hears(logger, "ends")
     assert begins == (20, f"one_move ({path}) begins")
     assert reason[0] == 40
-    assert reason[1].startswith(
-        "one_move: Work / To the part\n    ABORTED after 1 attempt: aborted by "
-    )
+    assert reason[1].startswith("one_move: ")
     assert str(path) in reason[1]
     assert ends[0] == 40
     assert ends[1].startswith("one_move ends: FAILURE after ")

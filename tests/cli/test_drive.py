@@ -14,16 +14,17 @@ from typing import Any
 import pytest
 from py_trees.common import Status
 
-from bt_actions.cli.driving.drive import Drive, Ended
+from bt_actions.cli.driving.drive import Drive
 from bt_actions.cli.driving.signals import SAME_WISH, Signals
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.lines import LineView
-from bt_actions.cli.views.words import Closing
 from bt_actions.events import Event
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.unaccounted import GoalReport
-from bt_actions.running.report import Report
-from tests.cli.fakes import FakeAction, FakeRunner, Story
+from bt_actions.story.state import State
+from tests.cli import fakes
+from tests.cli.fakes import FakeRunner
+from tests.support.told_trees import FakeAction, FakeNode, Story
 from tests.support.waiting import until
 
 
@@ -34,40 +35,45 @@ class Run:
         self, runner: FakeRunner, timeout: float | None = None, output: object = None
     ) -> None:
         self.output: Any = output
-        self.leaf = FakeAction("Move")
-        self.report = Report(self.leaf)
+        self.state = State()
         self.out = io.StringIO()
         self.runner = runner
         self.timeout = timeout
-        self.code: Exit | None = None
+        self.abandoned = False
 
-    def go(self, *kicks: object) -> Ended:
+    def go(self) -> Exit:
+        """Drive it to its end; return the exit code."""
         with Signals() as signals:
             drive = Drive(
                 self.runner,
                 self.runner.tick_to_end,
-                self.report,
-                LineView(self.report, self.out),
+                self.state,
+                LineView(self.state, self.out),
                 signals,
                 timeout=self.timeout,
                 output=self.output,
             )
-            ended = drive.run()
-            self.code = drive.finish(Closing(ended.code, ended.cause))
-        return ended
+            drive.run()
+            self.abandoned = drive.abandoned
+            return drive.finish()
 
 
 @pytest.fixture
-def story() -> Story:
-    return Story()
+def leaf() -> FakeNode:
+    return FakeAction("Move")
 
 
-def executing(run: Run, story: Story) -> list[Event]:
-    return [story.start(), story.goal(run.leaf, "EXECUTING")]
+@pytest.fixture
+def story(leaf: FakeNode) -> Story:
+    return Story(leaf)
 
 
-def canceled(run: Run, story: Story) -> list[Event]:
-    done = story.goal(run.leaf, "DONE", outcome=Outcome.CANCELED, end=End.CANCELED)
+def executing(story: Story) -> list[Event]:
+    return [story.began, story.goal(story.root, "EXECUTING")]
+
+
+def canceled(story: Story) -> list[Event]:
+    done = story.goal(story.root, "DONE", outcome=Outcome.CANCELED, end=End.CANCELED)
     return [done, story.finish(Status.INVALID)]
 
 
@@ -75,7 +81,7 @@ def canceled(run: Run, story: Story) -> list[Event]:
     ("status", "code"), [(Status.SUCCESS, Exit.SUCCESS), (Status.FAILURE, Exit.FAILURE)]
 )
 def test_the_status_of_the_tree_is_the_exit_code(status: Status, code: Exit, story: Story) -> None:
-    assert Run(FakeRunner([story.start(), story.finish(status)])).go().code is code
+    assert Run(FakeRunner([story.began, story.finish(status)])).go() is code
 
 
 @pytest.mark.parametrize(
@@ -91,20 +97,22 @@ def test_a_signal_interrupts_and_the_drained_run_has_its_code(
     number: signal.Signals, code: Exit, story: Story
 ) -> None:
     run = Run(FakeRunner(waits=True))
-    run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
+    run.runner.before, run.runner.after = executing(story), canceled(story)
     with killed_when(run.runner.playing, number):
-        ended = run.go()
-    assert (ended.code, ended.abandoned) == (code, False)
+        assert run.go() is code
+    assert not run.abandoned
     assert run.runner.interrupted.is_set()
     assert f"interrupted by {number.name}: canceling 1 goal; Ctrl-C again" in run.out.getvalue()
     assert f"STOPPED after 1.50 s, interrupted by {number.name}" in run.out.getvalue()
 
 
-def test_who_waits_after_the_end_of_the_tree_is_told_for_which_goals(story: Story) -> None:
+def test_who_waits_after_the_end_of_the_tree_is_told_for_which_goals(
+    leaf: FakeNode, story: Story
+) -> None:
     run = Run(FakeRunner(waits=True))
-    late = story.goal(run.leaf, "CANCELING", outcome=Outcome.ACCEPT_TIMEOUT, end=End.NEVER_STARTED)
-    run.runner.before = [story.start(), late, story.node(run.leaf, Status.FAILURE)]
-    unknown = story.goal(run.leaf, "CANCELING", outcome=Outcome.ACCEPT_TIMEOUT, end=End.UNKNOWN)
+    late = story.goal(leaf, "CANCELING", outcome=Outcome.ACCEPT_TIMEOUT, end=End.NEVER_STARTED)
+    run.runner.before = [story.began, late, story.node(leaf, Status.FAILURE)]
+    unknown = story.goal(leaf, "CANCELING", outcome=Outcome.ACCEPT_TIMEOUT, end=End.UNKNOWN)
     run.runner.after = [unknown, story.finish(Status.FAILURE)]
     said = "waiting to know the end of 1 goal: Move on move_robot; Ctrl-C twice leaves"
     text = run_until(run, said)
@@ -112,10 +120,10 @@ def test_who_waits_after_the_end_of_the_tree_is_told_for_which_goals(story: Stor
     assert "ACCEPT_TIMEOUT, not started as far as its server knows" in text
 
 
-def test_who_waits_for_a_server_that_went_away_is_told(story: Story) -> None:
+def test_who_waits_for_a_server_that_went_away_is_told(leaf: FakeNode, story: Story) -> None:
     run = Run(FakeRunner(waits=True))
-    gone = story.goal(run.leaf, "CANCELING", outcome=Outcome.SERVER_LOST, end=End.SERVER_GONE)
-    run.runner.before = [story.start(), gone, story.node(run.leaf, Status.FAILURE)]
+    gone = story.goal(leaf, "CANCELING", outcome=Outcome.SERVER_LOST, end=End.SERVER_GONE)
+    run.runner.before = [story.began, gone, story.node(leaf, Status.FAILURE)]
     run.runner.after = [story.finish(Status.FAILURE)]
     said = "to cancel its goal if it is back: Move on move_robot; Ctrl-C twice leaves"
     assert run_until(run, said).count(said) == 1
@@ -127,7 +135,7 @@ def run_until(run: Run, said: str) -> str:
     done = threading.Thread(target=lambda: (thread.join(), run.runner.interrupted.set()))
     for each in (thread, done):
         each.start()
-    assert run.go().code is Exit.FAILURE
+    assert run.go() is Exit.FAILURE
     done.join()
     return run.out.getvalue()
 
@@ -153,7 +161,7 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 def test_the_handlers_of_before_are_back_after_a_run(story: Story) -> None:
     before = [signal.getsignal(number) for number in ENDING]
-    Run(FakeRunner([story.finish(Status.SUCCESS)])).go()
+    Run(FakeRunner([story.began, story.finish(Status.SUCCESS)])).go()
     after = [signal.getsignal(number) for number in ENDING]
     assert after == before
 
@@ -174,19 +182,18 @@ def test_under_nohup_a_hangup_stays_ignored() -> None:
 
 def test_the_timeout_interrupts_with_124(story: Story) -> None:
     run = Run(FakeRunner(waits=True), timeout=0.05)
-    run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
-    assert run.go().code is Exit.TIMEOUT
+    run.runner.before, run.runner.after = executing(story), canceled(story)
+    assert run.go() is Exit.TIMEOUT
     assert "--timeout 0.05 s expired: canceling 1 goal" in run.out.getvalue()
 
 
 def test_a_timeout_that_expires_when_the_tree_has_finished_changes_nothing(story: Story) -> None:
     run = Run(FakeRunner(waits=True), timeout=0.05)
-    run.runner.before = [story.start(), story.finish(Status.SUCCESS)]
+    run.runner.before = [story.began, story.finish(Status.SUCCESS)]
     later = threading.Timer(0.3, run.runner.interrupted.set)  # its shutdown takes so long
     later.start()
-    ended = run.go()
+    assert run.go() is Exit.SUCCESS
     later.join()
-    assert ended.code is Exit.SUCCESS
 
 
 class SlowReader:
@@ -204,21 +211,20 @@ class SlowReader:
 def test_a_timeout_that_expires_in_the_shutdown_does_not_cut_off_the_output(story: Story) -> None:
     reader = SlowReader(5)
     run = Run(FakeRunner(waits=True), timeout=0.05, output=reader)
-    run.runner.before = [story.start(), story.finish(Status.SUCCESS)]
+    run.runner.before = [story.began, story.finish(Status.SUCCESS)]
     later = threading.Timer(0.3, run.runner.interrupted.set)  # its shutdown takes so long
     later.start()
-    run.go()
+    assert run.go() is Exit.SUCCESS
     later.join()
     assert reader.left == 0
-    assert run.code is Exit.SUCCESS
 
 
 def test_a_goal_whose_end_is_unknown_wins_over_every_other_code(story: Story) -> None:
     lost = GoalReport("Move", "/move_robot", "0123456789abcdef", Outcome.CANCELED, "no answer")
     for waits, timeout in ((False, None), (True, 0.05)):
-        run = Run(FakeRunner(waits=waits, unaccounted=[lost]), timeout=timeout)
-        run.runner.after = [story.finish(Status.SUCCESS)]
-        assert run.go().code is Exit.UNKNOWN
+        run = Run(FakeRunner([story.began], waits=waits), timeout=timeout)
+        run.runner.after = [story.finish(Status.SUCCESS, lost)]
+        assert run.go() is Exit.UNKNOWN
         last = run.out.getvalue().splitlines()[-1]
         assert last == "not accounted for: Move on /move_robot, goal 0123456789abcdef: no answer"
 
@@ -226,9 +232,10 @@ def test_a_goal_whose_end_is_unknown_wins_over_every_other_code(story: Story) ->
 def test_a_second_signal_ends_the_wait_at_once_and_the_report_says_what_is_left(
     story: Story,
 ) -> None:
-    older = GoalReport("Move", "/move_robot", "0123456789abcdef", Outcome.STALLED, "silent")
-    run = Run(FakeRunner(waits=True, never_drains=True, unaccounted=[older]))
-    run.runner.before = executing(run, story)
+    given_up = {"outcome": Outcome.STALLED, "end": End.UNKNOWN, "reason": "silent"}
+    older = story.goal(story.root, "DONE", visit=0, **given_up)
+    events = [story.began, older, story.goal(story.root, "EXECUTING")]
+    run = Run(FakeRunner(events, waits=True, never_drains=True))
     stop = threading.Event()
 
     def keep_killing() -> None:  # as an impatient user does
@@ -239,25 +246,26 @@ def test_a_second_signal_ends_the_wait_at_once_and_the_report_says_what_is_left(
     impatient = threading.Thread(target=keep_killing)
     impatient.start()
     with Signals():  # so that a signal after the end does not hit the test
-        ended = run.go()
+        code = run.go()
         stop.set()
         impatient.join()
     run.runner.released.set()
-    assert (ended.code, ended.abandoned) == (Exit.UNKNOWN, True)
+    assert (code, run.abandoned) == (Exit.UNKNOWN, True)
     assert run.out.getvalue().splitlines()[-2:] == [
-        "not accounted for: Move on /move_robot, goal 0123456789abcdef: silent",
+        "not accounted for: Move on move_robot, goal Move-0-1: silent",
         "not accounted for: Move on move_robot, goal Move-1-1: executing when left",
     ]
     assert "  CANCELED, end UNKNOWN  " in run.out.getvalue()
+    assert run.out.getvalue().count("Ctrl-C again leaves without waiting") == 1
 
 
 def test_a_second_signal_after_the_end_of_all_goals_leaves_none_unknown(story: Story) -> None:
     """It is left while node and context are still being closed."""
     run, closed = Run(FakeRunner(waits=True)), threading.Event()
-    run.runner.before = executing(run, story)
+    run.runner.before = executing(story)
 
     def takes_long_to_close() -> Iterator[Event]:
-        yield from canceled(run, story)
+        yield from canceled(story)
         while not run.runner.released.wait(SAME_WISH / 2):
             os.kill(os.getpid(), signal.SIGINT)
         closed.set()
@@ -265,20 +273,20 @@ def test_a_second_signal_after_the_end_of_all_goals_leaves_none_unknown(story: S
     run.runner.after = takes_long_to_close()
     with Signals():  # so that a signal after the end does not hit the test
         with killed_when(run.runner.playing, signal.SIGINT):
-            ended = run.go()
+            code = run.go()
         run.runner.released.set()
         closed.wait()
-    assert (ended.code, ended.abandoned) == (Exit.SIGINT, True)
+    assert (code, run.abandoned) == (Exit.SIGINT, True)
     assert "not accounted for" not in run.out.getvalue()
 
 
 def test_a_second_signal_waits_for_a_run_with_no_goal_left_to_be_over(story: Story) -> None:
     """The middleware may take its time for what was sent last."""
     run = Run(FakeRunner(waits=True))
-    run.runner.before = executing(run, story)
+    run.runner.before = executing(story)
 
     def takes_a_while() -> Iterator[Event]:
-        done, finished = canceled(run, story)
+        done, finished = canceled(story)
         yield done
         while not run.runner.abandoned.wait(SAME_WISH / 2):
             os.kill(os.getpid(), signal.SIGINT)
@@ -287,25 +295,41 @@ def test_a_second_signal_waits_for_a_run_with_no_goal_left_to_be_over(story: Sto
 
     run.runner.after = takes_a_while()
     with Signals(), killed_when(run.runner.playing, signal.SIGINT):
-        ended = run.go()
-    assert (ended.code, ended.abandoned) == (Exit.SIGINT, True)
+        code = run.go()
+    assert (code, run.abandoned) == (Exit.SIGINT, True)
     assert "not accounted for" not in run.out.getvalue()
 
 
 def test_one_wish_that_arrives_twice_is_one_wish(story: Story) -> None:
     run = Run(FakeRunner(waits=True))
-    run.runner.before, run.runner.after = executing(run, story), canceled(run, story)
+    run.runner.before, run.runner.after = executing(story), canceled(story)
     with (
         killed_when(run.runner.playing, signal.SIGINT),
         killed_when(run.runner.interrupted, signal.SIGINT),  # as a wrapper passes it on
     ):
-        assert not run.go().abandoned
+        assert run.go() is Exit.SIGINT
+    assert not run.abandoned
 
 
-def test_an_exception_in_the_tree_is_a_failure_and_is_handed_back(story: Story) -> None:
-    error = RuntimeError("a bug")
-    ended = Run(FakeRunner([story.start()], error=error)).go()
-    assert (ended.code, ended.error) == (Exit.FAILURE, error)
+def test_an_exception_in_the_tree_is_a_failure_and_is_told_with_its_place(story: Story) -> None:
+    """Of one that is told with the end of the tree, and of one in its setup, its end or closing."""
+    told = story.finish(Status.INVALID, error="a bug (own.py:3)")
+    run = Run(FakeRunner([story.began, told], error=RuntimeError("a bug")))
+    assert run.go() is Exit.FAILURE
+    assert run.out.getvalue().splitlines()[-1] == "a bug (own.py:3)"
+    for events in ([], [story.began], [story.began, story.finish(Status.SUCCESS)]):
+        run = Run(FakeRunner(events, error=RuntimeError("a bug")))
+        assert run.go() is Exit.FAILURE
+        last = run.out.getvalue().splitlines()[-1]
+        assert last.startswith(f"a bug ({fakes.__file__}:")
+        assert run.state.ended is not None
+        assert run.state.ended.error == last
+
+
+def test_a_tree_that_cannot_be_set_up_as_it_is_given_is_bad_input(story: Story) -> None:
+    told = story.finish(Status.INVALID, error="no such type", unusable=True)
+    run = Run(FakeRunner([story.began, told], error=RuntimeError("no such type")))
+    assert run.go() is Exit.BAD_INPUT
 
 
 def test_a_view_that_fails_is_given_up_and_the_run_goes_on(
@@ -315,12 +339,10 @@ def test_a_view_that_fails_is_given_up_and_the_run_goes_on(
         def write(self, text: str) -> int:
             raise OSError(28, "No space left on device")
 
-    run = Run(FakeRunner())
+    run = Run(FakeRunner([*executing(story), story.finish(Status.SUCCESS)]))
     run.out = FullDisk()
-    run.runner.before = [*executing(run, story), story.finish(Status.SUCCESS)]
-    ended = run.go()
-    assert ended.code is Exit.SUCCESS
-    assert run.code is Exit.FAILURE, "a success that nobody could be told is none"
+    assert run.go() is Exit.FAILURE, "a success that nobody could be told is none"
+    assert run.state.status is Status.SUCCESS
     said = capsys.readouterr().err
     assert said.count("nothing more can be shown") == 1
     assert "No space left on device" in said

@@ -6,69 +6,76 @@ import io
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import pyte
 import pytest
-from py_trees.behaviour import Behaviour
-from py_trees.behaviours import Success
 from py_trees.common import Status
-from py_trees.composites import Selector, Sequence
 from rich.console import Console
 
-from bt_actions.cli.exits import Exit
+from bt_actions.cli.driving.feed import Feed
 from bt_actions.cli.views.choosing import choose
 from bt_actions.cli.views.json_lines import JsonView
-from bt_actions.cli.views.lines import LineView
+from bt_actions.cli.views.lines import LASTING, LineView
 from bt_actions.cli.views.live import SCROLLS, LiveView, suits
 from bt_actions.cli.views.view import View
-from bt_actions.cli.views.words import Closing, last_words, result_lines
 from bt_actions.document import load_tree
-from bt_actions.document.findings import LOADED
-from bt_actions.events import Event, TreeFinished
+from bt_actions.events import Event, RunEnded, StopWanted
+from bt_actions.events.snapshot import snapshot
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.messages.fields import fields_in_words
-from bt_actions.running.report import Report
-from tests.cli.fakes import FakeAction, FakeProgress, Story
+from bt_actions.story.state import State
+from bt_actions.story.words import last_words
+from bt_actions.testing import VirtualRunner
+from tests.support.told_trees import FakeAction, FakeNode, Story
 
 
 @pytest.fixture
-def story() -> Story:
-    return Story()
-
-
-@pytest.fixture
-def leaves() -> list[FakeAction]:
+def leaves() -> list[FakeNode]:
     return [FakeAction(f"Step {number}") for number in range(10)]
 
 
 @pytest.fixture
-def root(leaves: list[FakeAction]) -> Behaviour:
+def root(leaves: list[FakeNode]) -> FakeNode:
     """A fallback over a sequence of ten actions, and another leaf."""
-    work = Sequence("Work", memory=True, children=list(leaves))
-    return Selector("Deliver", memory=True, children=[work, Success("Recover")])
+    work = FakeNode("Work", list(leaves))
+    return FakeNode("Deliver", [work, FakeNode("Recover", kind="success")], "fallback")
 
 
-def feed(report: Report, view: View, *events: Event) -> None:
+@pytest.fixture
+def story(root: FakeNode) -> Story:
+    return Story(root)
+
+
+def feed(state: State, view: View, *events: Event) -> None:
+    feeding = Feed(state, view)
     for event in events:
-        report.observe(event)
-        view.event(event)
+        feeding.event(event)
+
+
+def finish(state: State, view: View, exit_code: int = 0, **more: Any) -> None:
+    """End the run, as whoever drives it does."""
+    assert state.now is not None
+    feed(state, view, RunEnded(state.now, exit_code, **more))
+    view.finish()
 
 
 # Lines
 
 
 class Lines:
-    """A LineView with a clock that only moves when it is told to."""
+    """A LineView, and what it wrote."""
 
-    def __init__(self, root: Behaviour, *, verbose: bool = False) -> None:
-        self.report, self.out, self.now = Report(root), io.StringIO(), 0.0
-        self.view = LineView(self.report, self.out, verbose=verbose, clock=lambda: self.now)
+    def __init__(self, *events: Event, verbose: bool = False) -> None:
+        self.state, self.out = State(), io.StringIO()
+        self.view = LineView(self.state, self.out, verbose=verbose)
+        self.feeding = Feed(self.state, self.view)
+        self.feed(*events)
 
     def feed(self, *events: Event) -> None:
-        feed(self.report, self.view, *events)
+        for event in events:
+            self.feeding.event(event)
 
     @property
     def said(self) -> list[str]:
@@ -77,15 +84,14 @@ class Lines:
 
 
 def test_a_line_for_each_change_of_a_node_one_for_a_goal_under_way_and_one_for_its_end(
-    root: Behaviour, leaves: list[FakeAction], story: Story
+    root: FakeNode, leaves: list[FakeNode], story: Story
 ) -> None:
-    lines = Lines(root)
-    lines.feed(story.start(), story.node(root, Status.RUNNING), *story.succeed(leaves[0]))
+    lines = Lines(story.began, story.node(root, Status.RUNNING), *story.succeed(leaves[0]))
     lines.feed(story.node(leaves[1], Status.RUNNING))
     for state in ("QUEUED", "WAITING_FOR_SERVER", "SENDING", "EXECUTING", "EXECUTING"):
         lines.feed(story.goal(leaves[1], state))
     aborted = {"outcome": Outcome.ABORTED, "end": End.ABORTED, "reason": "a fault"}
-    lines.feed(story.goal(leaves[1], "DONE", **aborted))  # type: ignore[arg-type]
+    lines.feed(story.goal(leaves[1], "DONE", **aborted))
     assert lines.out.getvalue().splitlines() == [
         "    0.50 s  RUNNING  Deliver",
         "    2.00 s  goal     Deliver / Work / Step 0: executing on move_robot",
@@ -95,27 +101,62 @@ def test_a_line_for_each_change_of_a_node_one_for_a_goal_under_way_and_one_for_i
     ]
 
 
+def test_a_check_that_succeeds_again_and_again_has_one_line_in_each_round_of_a_loop() -> None:
+    check = FakeNode("Check", kind="check")
+    loop = FakeNode("Again", [check], "repeat")
+    story, succeeds = Story(loop), Status.SUCCESS
+    lines = Lines(story.began, story.node(check, succeeds), story.node(check, succeeds))
+    assert lines.said == ["SUCCESS  Again / Check"]
+    lines.feed(story.round(loop, 1), story.node(check, succeeds), story.node(check, succeeds))
+    assert lines.said == ["SUCCESS  Again / Check"] * 2
+    lines.feed(story.node(check, Status.FAILURE, "no"), story.node(check, Status.FAILURE, "no"))
+    assert lines.said[2:] == ["FAILURE  Again / Check: no"]
+
+
+def test_a_round_of_one_loop_tells_nothing_anew_of_what_is_outside_of_it() -> None:
+    loop = FakeNode("Again", [FakeNode("Inner", kind="check")], "repeat")
+    other = FakeNode("Other", kind="check")
+    story = Story(FakeNode("Both", [loop, other], "parallel"))
+    screen, drawn, succeeds = Screen(24), State(), Status.SUCCESS
+    view = LiveView(drawn, screen.console)
+    events: list[Event] = [story.began]
+    for number in range(3):
+        events.append(story.round(loop, number))
+        events += [story.node(node, succeeds) for node in (loop.children[0], other)]
+    assert Lines(*events).said.count("SUCCESS  Both / Other") == 1
+    feed(drawn, view, *events)
+    view.close()
+    assert screen.lines() == ["✓ Inner", "✓ Other", "✓ Inner", "✓ Inner"]
+
+
+def test_a_leaf_that_was_stopped_is_told_of_anew(leaves: list[FakeNode], story: Story) -> None:
+    recover = story.root.children[1]
+    lines = Lines(story.began)
+    for status in (Status.RUNNING, Status.INVALID, Status.RUNNING):
+        lines.feed(story.node(recover, status))
+    assert lines.said == ["RUNNING  Deliver / Recover"] * 2
+
+
 HOSTILE = "done\n    9.99 s  SUCCESS  Deliver\x1b[2J\x9b1A"
 TAMED = "done     9.99 s  SUCCESS  Deliver [2J 1A"
 """What a tree may log, and what of it is shown."""
 
 
 def test_what_a_tree_says_forges_no_line_and_gives_the_terminal_no_commands(
-    root: Behaviour, leaves: list[FakeAction], story: Story
+    root: FakeNode, leaves: list[FakeNode], story: Story
 ) -> None:
     recover = root.children[1]
     failed = {"outcome": Outcome.ABORTED, "end": End.ABORTED, "reason": HOSTILE}
     news = [
-        story.start(),
-        story.goal(leaves[0], "DONE", **failed),  # type: ignore[arg-type]
+        story.began,
+        story.goal(leaves[0], "DONE", **failed),
         story.node(leaves[0], Status.FAILURE, HOSTILE),
         story.node(recover, Status.FAILURE, HOSTILE),
         story.node(root, Status.FAILURE),
         story.finish(Status.FAILURE),
     ]
-    lines = Lines(root)
-    lines.feed(*news)
-    lines.view.finish(Closing(Exit.FAILURE))
+    lines = Lines(*news)
+    finish(lines.state, lines.view, 1)
     written = lines.out.getvalue()
     assert f"Deliver / Recover: {TAMED}\n" in written
     assert f"  failed: {TAMED}\n" in written
@@ -124,34 +165,26 @@ def test_what_a_tree_says_forges_no_line_and_gives_the_terminal_no_commands(
     assert not any(line.startswith("    9.99 s") for line in written.splitlines())
 
     screen = Screen(24)
-    report = Report(root)
-    view = LiveView(report, screen.console)
-    feed(report, view, *news)
-    view.finish(Closing(Exit.FAILURE))
+    state = State()
+    view = LiveView(state, screen.console)
+    feed(state, view, *news)
+    finish(state, view, 1)
     assert f"✗ Recover  {TAMED}" in screen.lines()
 
 
-def test_an_output_is_one_line_whatever_it_holds(tmp_path: Path, story: Story) -> None:
-    path = tmp_path / "tree.yaml"
-    path.write_text(
-        f"tree: t\noutputs: {{x: string}}\nroot: {{set: {{x: {json.dumps(HOSTILE)}}}}}\n"
-    )
-    root = load_tree(path)
-    root.tick_once()
-    report = Report(root)
-    report.observe(story.finish(Status.SUCCESS))
-    assert f"x: {TAMED}" in last_words(report, Closing(Exit.SUCCESS))
+def test_an_output_is_one_line_whatever_it_holds(story: Story) -> None:
+    state = story.told(story.finish(Status.SUCCESS, outputs={"x": HOSTILE}))
+    assert f"x: {TAMED}" in last_words(state)
 
 
 def test_what_one_tick_ended_comes_before_what_it_began(
-    root: Behaviour, leaves: list[FakeAction], story: Story
+    leaves: list[FakeNode], story: Story
 ) -> None:
-    lines = Lines(root, verbose=True)
-    begun, ended = story.node(leaves[0], Status.RUNNING), story.node(leaves[0], Status.SUCCESS)
-    lines.feed(story.start(), begun, story.goal(leaves[0], "EXECUTING"))
+    begun = story.node(leaves[0], Status.RUNNING)
+    lines = Lines(story.began, begun, story.goal(leaves[0], "EXECUTING"), verbose=True)
     lines.feed(story.goal(leaves[0], "DONE", outcome=Outcome.SUCCEEDED, end=End.SUCCEEDED))
     lines.feed(story.goal(leaves[1], "SENDING"), story.goal(leaves[1], "EXECUTING"))
-    lines.feed(ended, story.node(leaves[1], Status.RUNNING))
+    lines.feed(story.node(leaves[0], Status.SUCCESS), story.node(leaves[1], Status.RUNNING))
     assert lines.said == [
         "goal     Deliver / Work / Step 0: executing on move_robot",
         "SUCCESS  Deliver / Work / Step 0",
@@ -169,24 +202,49 @@ def test_what_one_tick_ended_comes_before_what_it_began(
     ],
 )
 def test_a_goal_that_waits_gets_a_line_when_it_waits_for_a_second(
-    state: str, words: str, root: Behaviour, leaves: list[FakeAction], story: Story
+    state: str, words: str, leaves: list[FakeNode], story: Story
 ) -> None:
-    lines = Lines(root)
-    lines.feed(story.start(), story.node(leaves[0], Status.RUNNING), story.goal(leaves[0], state))
-    for lines.now in (0.5, 0.9, 1.0, 5.0):
-        lines.view.frame()
-        assert len(lines.said) == (lines.now >= 1.0)
-    assert lines.said == [f"goal     Deliver / Work / Step 0: {words} move_robot"]
+    lines = Lines(story.began, story.node(leaves[0], Status.RUNNING), story.goal(leaves[0], state))
+    for waited in (0.5, 0.9, LASTING, 5.0):
+        lines.feeding.frame(story.time + waited)
+        assert len(lines.said) == (waited >= LASTING)
+    assert lines.out.getvalue().splitlines() == [
+        f"    2.00 s  goal     Deliver / Work / Step 0: {words} move_robot"
+    ], "the time at which it had lasted, whenever that was drawn"
 
 
-def test_the_last_line_is_what_went_wrong(
-    root: Behaviour, leaves: list[FakeAction], story: Story
+def test_what_lasted_has_its_line_before_the_event_that_ends_it_also_where_nothing_is_drawn(
+    leaves: list[FakeNode], story: Story
 ) -> None:
-    report, out = Report(root), io.StringIO()
-    view = LineView(report, out)
-    feed(report, view, story.start(), *story.succeed(leaves[0]), story.finish(Status.SUCCESS))
-    view.finish(Closing(Exit.FAILURE, verdict="It lies there.", complaint="It should lie here."))
-    assert out.getvalue().splitlines()[-7:] == [
+    """As where stored events are shown: the same lines."""
+    events = [story.began, story.goal(leaves[0], "QUEUED")]
+    story.time += 5.0
+    events.append(story.goal(leaves[0], "WAITING_FOR_SERVER"))
+    story.time += 0.1
+    events += [story.goal(leaves[0], "EXECUTING"), story.node(leaves[0], Status.RUNNING)]
+    drawn, stored = Lines(*events[:2]), Lines(*events)
+    for tenth in range(1, 50):
+        drawn.feeding.frame(events[1].at.steady + tenth / 10)
+    drawn.feed(*events[2:])
+    assert drawn.out.getvalue() == stored.out.getvalue()
+    assert stored.out.getvalue().splitlines() == [
+        "    1.50 s  goal     Deliver / Work / Step 0: waiting for its turn on move_robot",
+        "    6.60 s  goal     Deliver / Work / Step 0: executing on move_robot",
+    ]
+
+
+def test_a_wish_to_stop_is_told_with_what_is_canceled(leaves: list[FakeNode], story: Story) -> None:
+    lines = Lines(story.began, story.goal(leaves[0], "EXECUTING"))
+    lines.feed(StopWanted(story._next(), "SIGINT", "interrupted by SIGINT"))
+    assert lines.out.getvalue().splitlines()[-1] == (
+        "interrupted by SIGINT: canceling 1 goal; Ctrl-C again leaves without waiting"
+    )
+
+
+def test_the_last_line_is_what_went_wrong(leaves: list[FakeNode], story: Story) -> None:
+    lines = Lines(story.began, *story.succeed(leaves[0]), story.finish(Status.SUCCESS))
+    finish(lines.state, lines.view, 1, world="It lies there.", complaint="It should lie here.")
+    assert lines.out.getvalue().splitlines()[-7:] == [
         "Step 0  move_robot         1  SUCCEEDED    1.00 s",
         "",
         "It lies there.",
@@ -201,35 +259,53 @@ def test_the_last_line_is_what_went_wrong(
 
 
 def objects_of(
-    root: Behaviour, events: Iterable[Event], status: Status = Status.SUCCESS, note: str = ""
+    story: Story, *events: Event, status: Status = Status.SUCCESS, note: str = "", **more: Any
 ) -> list[dict[str, Any]]:
     """What is written of a run that ends with `status` after `events`."""
-    report, out = Report(root), io.StringIO()
-    view = JsonView(report, out)
-    for event in events:
-        feed(report, view, event)
-    feed(report, view, TreeFinished(report.now, status))
+    return written([story.began, *events, story.finish(status, **more)], note)
+
+
+def written(events: Iterable[Event], note: str = "") -> list[dict[str, Any]]:
+    """What is written of a run that tells `events`."""
+    state, out = State(), io.StringIO()
+    view = JsonView(state, out)
+    feed(state, view, *events)
     if note:
         view.say(note)
-    view.finish(Closing(Exit.SUCCESS if status is Status.SUCCESS else Exit.FAILURE))
+    finish(state, view, 0 if state.status is Status.SUCCESS else 1)
     return [json.loads(line) for line in out.getvalue().splitlines()]
 
 
 def test_json_is_one_object_a_line_and_the_last_one_is_the_result(
-    root: Behaviour, leaves: list[FakeAction], story: Story
+    root: FakeNode, leaves: list[FakeNode], story: Story
 ) -> None:
-    objects = objects_of(root, [story.start(), *story.succeed(leaves[0])], note="a note")
+    events = story.succeed(leaves[0])
+    events[3:3] = [story.feedback(leaves[0], {"pose": 1.0})]
+    events[5:5] = [story.verdict(leaves[0], Outcome.SUCCEEDED)]
+    objects = objects_of(story, story.round(root, 0), *events, note="a note")
     kinds = [each["event"] for each in objects]
-    assert kinds == ["started", "node", "goal", "goal", "goal", "node", "note", "finished"]
+    assert kinds == [
+        "started",
+        "round",
+        "node",
+        "goal",
+        "goal",
+        "feedback",
+        "goal",
+        "attempt",
+        "node",
+        "note",
+        "finished",
+    ]
     last = objects[-1]
     assert (last["status"], last["exit_code"]) == ("SUCCESS", 0)
     action = last["actions"][0]
-    assert {key: action[key] for key in ("name", "server", "attempts", "outcome", "duration")} == {
+    assert {key: action[key] for key in ("name", "server", "attempts", "visits", "outcome")} == {
         "name": "Step 0",
         "server": "move_robot",
         "attempts": 1,
+        "visits": 1,
         "outcome": "SUCCEEDED",
-        "duration": 1.0,
     }
     text = (Path(__file__).parents[2] / "docs" / "running.md").read_text()
     table = dict(re.findall(r"^\| `(\w+)` \|[^|]*\| (.*) \|$", text, re.MULTILINE))
@@ -239,19 +315,66 @@ def test_json_is_one_object_a_line_and_the_last_one_is_the_result(
     assert re.findall(r"`(\w+)`", actions) == list(action)
 
 
-def test_each_node_has_an_id_of_its_own_in_the_order_of_the_file(story: Story) -> None:
+def test_json_tells_what_a_goal_was_sent_what_came_of_it_and_when(
+    leaves: list[FakeNode], story: Story
+) -> None:
+    leaf = leaves[0]
+    failed = {"outcome": Outcome.ABORTED, "end": End.ABORTED, "reason": "a fault"}
+    _, sent, came, done, judged, _ = objects_of(
+        story,
+        story.goal(leaf, "SENDING", goal={"distance": 2.0}),
+        story.feedback(leaf, {"data": b"\x01\x02"}),
+        story.goal(leaf, "DONE", **failed, result={"pose": math.nan}),
+        story.verdict(leaf, Outcome.ABORTED, "a fault", again_in=0.5),
+        status=Status.FAILURE,
+    )
+    assert (sent["goal"], sent["result"]) == ({"distance": 2.0}, None)
+    assert came["feedback"] == {"data": [1, 2]}
+    assert (done["goal"], done["result"]) == (None, {"pose": None})
+    assert (judged["reason"], judged["again_in"], judged["expect"]) == ("a fault", 0.5, None)
+    for each, at in ((sent, 0.5), (came, 1.0), (done, 1.5), (judged, 2.0)):
+        assert (each["id"], each["path"]) == (leaf.id, ["Deliver", "Work", "Step 0"])
+        assert (each["time"], each["wall"]) == (at, 1e9 + 100.0 + at)
+
+
+def test_json_tells_of_each_failure_what_it_was_and_who_dealt_with_it(
+    root: FakeNode, leaves: list[FakeNode], story: Story
+) -> None:
+    work, recover = root.children
+    *_, finished = objects_of(
+        story,
+        story.goal(leaves[0], "SENDING", goal={"distance": 2.0}),
+        *story.fail(leaves[0], "a fault"),
+        story.node(work, Status.FAILURE),
+        story.node(recover, Status.SUCCESS),
+        story.node(root, Status.SUCCESS),
+    )
+    assert finished["failures"] == []
+    (failure,) = finished["dealt_with"]
+    assert failure == {
+        "id": leaves[0].id,
+        "path": ["Deliver", "Work", "Step 0"],
+        "attempts": 1,
+        "outcome": "ABORTED",
+        "reason": "a fault",
+        "place": None,
+        "server": "move_robot",
+        "goal": {"distance": 2.0},
+        "result": None,
+        "items": [],
+        "by": root.id,
+    }
+
+
+def test_each_node_has_an_id_of_its_own_in_the_order_of_the_file() -> None:
     duplicates = [FakeAction("Step"), FakeAction("Step"), FakeAction("Step")]
-    root = Sequence("Step", memory=True, children=[*duplicates[:2]])
-
-    def insert_one_and_fail() -> Iterator[Event]:
-        yield story.start()
-        root.add_child(duplicates[2])
-        for duplicate in reversed(duplicates):
-            yield story.goal(duplicate, "DONE", outcome=Outcome.ABORTED, end=End.ABORTED)
-            yield story.node(duplicate, Status.FAILURE)
-        yield story.node(root, Status.FAILURE)
-
-    started, *told, finished = objects_of(root, insert_one_and_fail(), Status.FAILURE)
+    root = FakeNode("Step", duplicates[:2])
+    story = Story(root)
+    events: list[Event] = [story.add(duplicates[2], root)]
+    for duplicate in reversed(duplicates):
+        events += story.fail(duplicate)[1:]
+    events.append(story.node(root, Status.FAILURE))
+    started, *told, finished = objects_of(story, *events, status=Status.FAILURE)
     assert [(node["id"], node["parent"]) for node in started["nodes"]] == [
         (1, None),
         (2, 1),
@@ -262,17 +385,44 @@ def test_each_node_has_an_id_of_its_own_in_the_order_of_the_file(story: Story) -
     assert [each["id"] for each in finished["failures"]] == [2, 3, 4]
 
 
-def test_json_names_the_tree_as_its_file_does_and_its_nodes(tmp_path: Path, story: Story) -> None:
+def test_json_names_the_tree_as_its_file_does_and_its_nodes(tmp_path: Path) -> None:
     path = tmp_path / "tree.yaml"
-    path.write_text("tree: errand\nroot: {invert: Not, child: {wait: 1 s, name: A moment}}\n")
-    assert objects_of(load_tree(path), [story.start()])[0] == {
+    path.write_text(
+        "tree: errand\ninputs: {n: {type: int8, default: 2}}\n"
+        "root: {invert: Not, child: {wait: 1 s, name: A moment}}\n"
+    )
+    runner = VirtualRunner(load_tree(path))
+    runner.run()
+    began = runner.state.began
+    assert began is not None
+    assert written(runner.events)[0] == {
         "event": "started",
         "tree": "errand",
+        "run": began.run_id,
+        "wall": began.at.wall,
+        "inputs": {"n": 2},
         "nodes": [
-            {"id": 1, "parent": None, "name": "Not", "kind": "invert", "place": f"{path}:2:8"},
-            {"id": 2, "parent": 1, "name": "A moment", "kind": "wait", "place": f"{path}:2:29"},
+            {"id": 1, "parent": None, "name": "Not", "kind": "invert", "place": f"{path}:3:8"},
+            {"id": 2, "parent": 1, "name": "A moment", "kind": "wait", "place": f"{path}:3:29"},
         ],
     }
+
+
+LARGE = (7,) * 1_000_000
+
+
+def test_json_has_outputs_whole_however_long_they_are(story: Story) -> None:
+    outputs = {"many": LARGE, "text": "x" * 1_000_000}
+    *_, finished = objects_of(story, outputs=outputs)
+    assert finished["outputs"] == {"many": list(LARGE), "text": "x" * 1_000_000}
+
+
+def test_numbers_that_json_has_no_word_for_are_null(story: Story) -> None:
+    out = io.StringIO()
+    view = JsonView(State(), out)
+    view._write({"outputs": {"n": math.nan, "all": [1.0, -math.inf]}, "duration": 2.5})
+    expected = {"outputs": {"n": None, "all": [1.0, None]}, "duration": 2.5}
+    assert json.loads(out.getvalue(), parse_constant=pytest.fail) == expected
 
 
 # The live drawing
@@ -309,15 +459,15 @@ class Screen:
 
 @pytest.mark.parametrize("height", [1, 3, 6, 12, 24, 50])
 def test_the_live_part_leaves_lines_for_what_scrolls_by(
-    height: int, root: Behaviour, leaves: list[FakeAction], story: Story
+    height: int, root: FakeNode, leaves: list[FakeNode], story: Story
 ) -> None:
     screen = Screen(height)
-    report = Report(root)
-    view = LiveView(report, screen.console)
-    feed(report, view, story.start(), story.node(root, Status.RUNNING))
-    feed(report, view, story.node(root.children[0], Status.RUNNING))
-    feed(report, view, story.node(leaves[4], Status.RUNNING), story.goal(leaves[4], "EXECUTING"))
-    view.frame()
+    state = State()
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began, story.node(root, Status.RUNNING))
+    feed(state, view, story.node(root.children[0], Status.RUNNING))
+    feed(state, view, story.node(leaves[4], Status.RUNNING), story.goal(leaves[4], "EXECUTING"))
+    view.frame(story.time)
     drawn = screen.lines()
     assert 1 <= len(drawn) <= max(1, height / 3, height - 1 - SCROLLS)
     if height >= 12:
@@ -325,42 +475,60 @@ def test_the_live_part_leaves_lines_for_what_scrolls_by(
     view.close()
 
 
-def test_it_shows_what_an_action_does_its_attempt_its_feedback_and_the_time_left(
-    root: Behaviour, leaves: list[FakeAction], story: Story
-) -> None:
+def test_it_shows_what_an_action_does_its_attempt_its_feedback_and_the_time_left() -> None:
     screen = Screen(60, width=120)
-    report = Report(root)
-    view = LiveView(report, screen.console)
-    leaves[2].shown = FakeProgress(
-        attempt=2, attempts=3, feedback=move_feedback(), seconds_left=4.2, deadline="result"
-    )
-    feed(report, view, story.start(), story.node(leaves[2], Status.RUNNING))
-    feed(report, view, story.goal(leaves[2], "EXECUTING", attempt=2))
-    view.frame()
+    leaf, feedback = moving("Step 2", attempts=3)
+    story, state = Story(FakeNode("Work", [leaf])), State()
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began, story.node(leaf, Status.RUNNING))
+    feed(state, view, story.goal(leaf, "EXECUTING", attempt=2))
+    feed(state, view, story.feedback(leaf, feedback, attempt=2))
+    view.frame(story.time - story.step + 25.8)
     doing = "executing, attempt 2 of 3, 4.2 s left for the result, current_pose 1.50, status MOVING"
     assert [line.strip() for line in screen.lines() if "2  ex" in line] == [f"▶ Step 2  {doing}"]
     view.close()
 
 
-def move_feedback() -> object:
+def test_between_two_attempts_it_shows_why_and_when_the_next_begins() -> None:
+    screen = Screen(60, width=120)
+    leaf, _ = moving("Step", attempts=3)
+    story, state = Story(FakeNode("Work", [leaf])), State()
+    view = LiveView(state, screen.console)
+    failed = {"outcome": Outcome.ABORTED, "end": End.ABORTED, "reason": "a fault"}
+    feed(state, view, story.began, story.node(leaf, Status.RUNNING))
+    feed(state, view, story.goal(leaf, "DONE", **failed))
+    feed(state, view, story.verdict(leaf, Outcome.ABORTED, "a fault", again_in=2.0))
+    view.frame(story.time + 0.5)
+    doing = "ABORTED: a fault, again in 1.5 s, attempt 2 of 3"
+    assert [line.strip() for line in screen.lines() if "Step" in line] == [f"▶ Step  {doing}"]
+    view.close()
+
+
+def moving(name: str, *, attempts: int = 1) -> tuple[FakeNode, Any]:
+    """A leaf that may execute for 30 s, and feedback for it."""
     from robot_control_interfaces.action import MoveRobot
 
-    return MoveRobot.Feedback(current_pose=1.5, status=MoveRobot.Feedback.STATUS_MOVING)
+    feedback = MoveRobot.Feedback(current_pose=1.5, status=MoveRobot.Feedback.STATUS_MOVING)
+    constants: Any = {"feedback": {"status": {str(feedback.status): "MOVING"}}}
+    leaf = FakeAction(
+        name, attempts=attempts, timeouts={"result": 30.0, "feedback": None}, constants=constants
+    )
+    return leaf, snapshot(feedback)
 
 
 def test_finished_work_scrolls_by_once_and_the_drawing_is_gone_at_the_end(
-    root: Behaviour, leaves: list[FakeAction], story: Story
+    root: FakeNode, leaves: list[FakeNode], story: Story
 ) -> None:
     screen = Screen(24)
-    report = Report(root)
-    view = LiveView(report, screen.console)
-    feed(report, view, story.start(), story.node(root, Status.RUNNING))
+    state = State()
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began, story.node(root, Status.RUNNING))
     for leaf in leaves:
         for event in story.succeed(leaf):
-            feed(report, view, event)
-            view.frame()
-    feed(report, view, story.node(root, Status.SUCCESS), story.finish(Status.SUCCESS))
-    view.finish(Closing(Exit.SUCCESS))
+            feed(state, view, event)
+            view.frame(story.time)
+    feed(state, view, story.node(root, Status.SUCCESS), story.finish(Status.SUCCESS))
+    finish(state, view)
     lines = screen.lines()
     for leaf in leaves:
         assert lines.count(f"✓ {leaf.name}  move_robot  SUCCEEDED  1.00 s") == 1
@@ -368,55 +536,57 @@ def test_finished_work_scrolls_by_once_and_the_drawing_is_gone_at_the_end(
     assert lines[-1].startswith("SUCCESS after")
 
 
-def test_a_check_that_succeeds_again_and_again_scrolls_by_once(
-    root: Behaviour, story: Story
+def test_a_check_that_succeeds_again_and_again_scrolls_by_once_in_each_round(
+    root: FakeNode, story: Story
 ) -> None:
     screen = Screen(24)
-    report = Report(root)
-    view = LiveView(report, screen.console)
+    state = State()
+    view = LiveView(state, screen.console)
     check = root.children[1]
-    for _ in range(50):
-        feed(report, view, story.node(check, Status.SUCCESS), story.node(check, Status.INVALID))
-    feed(report, view, story.node(check, Status.FAILURE))
+    feed(state, view, story.began)
+    for number in range(2):
+        feed(state, view, story.round(root, number))
+        feed(state, view, *(story.node(check, Status.SUCCESS) for _ in range(50)))
+    feed(state, view, story.node(check, Status.FAILURE))
     view.close()
-    assert screen.lines() == ["✓ Recover", "✗ Recover"]
+    assert screen.lines() == ["✓ Recover", "✓ Recover", "✗ Recover"]
 
 
 def test_a_terminal_that_knows_only_ascii_gets_only_ascii(
-    root: Behaviour, leaves: list[FakeAction], story: Story
+    root: FakeNode, leaves: list[FakeNode], story: Story
 ) -> None:
     screen = Screen(18, encoding="ascii")
-    report = Report(root)
-    view = LiveView(report, screen.console)
-    feed(report, view, story.start(), story.node(root, Status.RUNNING))
-    feed(report, view, *story.succeed(leaves[0]), story.node(leaves[1], Status.RUNNING))
-    view.frame()
-    view.finish(Closing(Exit.SUCCESS))
+    state = State()
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began, story.node(root, Status.RUNNING))
+    feed(state, view, *story.succeed(leaves[0]), story.node(leaves[1], Status.RUNNING))
+    view.frame(story.time)
+    finish(state, view)
     assert any(line.startswith("+ Step 0") for line in screen.lines())
 
 
-def test_no_line_is_wider_than_the_terminal(leaves: list[FakeAction], story: Story) -> None:
+def test_no_line_is_wider_than_the_terminal(leaves: list[FakeNode]) -> None:
     screen = Screen(30, width=30)
-    root = Sequence("A long name " * 9, memory=True, children=list(leaves))
-    report = Report(root)
-    view = LiveView(report, screen.console)
-    feed(report, view, story.start(), story.node(root, Status.RUNNING))
-    view.frame()
+    root = FakeNode("A long name " * 9, list(leaves))
+    story, state = Story(root), State()
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began, story.node(root, Status.RUNNING))
+    view.frame(story.time)
     assert len(screen.lines()) == 1 + 11
     view.close()
 
 
 @pytest.mark.parametrize("running", [0, 4, 9])
 def test_the_room_that_there_is_is_used(
-    running: int, root: Behaviour, leaves: list[FakeAction], story: Story
+    running: int, root: FakeNode, leaves: list[FakeNode], story: Story
 ) -> None:
     screen = Screen(9 + 1 + SCROLLS)
-    report = Report(root)
-    view = LiveView(report, screen.console)
-    feed(report, view, story.start())
+    state = State()
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began)
     for node in (root, root.children[0], leaves[running]):
-        feed(report, view, story.node(node, Status.RUNNING))
-    view.frame()
+        feed(state, view, story.node(node, Status.RUNNING))
+    view.frame(story.time)
     assert len(screen.lines()) == 9, screen.lines()
     view.close()
 
@@ -426,64 +596,65 @@ def test_a_tree_that_fits_into_the_screen_is_shown_whole(height: int) -> None:
     most = height - 1 - SCROLLS
     for steps, lines in ((most - 2, most), (most - 1, most)):
         screen = Screen(height)
-        root = Sequence("Work", memory=True, children=[FakeAction(f"S{n}") for n in range(steps)])
-        view = LiveView(Report(root), screen.console)
-        view.frame()
+        story = Story(FakeNode("Work", [FakeAction(f"S{n}") for n in range(steps)]))
+        state = State()
+        view = LiveView(state, screen.console)
+        feed(state, view, story.began)
+        view.frame(story.time)
         assert len(screen.lines()) == lines
         assert (screen.lines()[-1] == f"  · S{steps - 1}") is (steps == most - 2), "or a remark"
         view.close()
 
 
-def two_arms() -> tuple[Behaviour, list[FakeAction]]:
+def two_arms() -> tuple[FakeNode, list[FakeNode]]:
     """Two subtrees alike, one deeper than the other, and leaves of other names."""
     leaves = [FakeAction(name) for name in ("Close", "Close", "Open", "Close")]
-    arms = [Sequence(name, memory=True) for name in ("Left", "Right", "Right")]
-    arms[0].add_children([Sequence("Grip", memory=True, children=[leaves[0]]), leaves[2]])
-    arms[1].add_child(Sequence("Grip", memory=True, children=[leaves[1]]))
-    arms[2].add_child(leaves[3])
-    return Sequence("Both", memory=True, children=arms), leaves
+    arms = [
+        FakeNode("Left", [FakeNode("Grip", [leaves[0]]), leaves[2]]),
+        FakeNode("Right", [FakeNode("Grip", [leaves[1]])]),
+        FakeNode("Right", [leaves[3]]),
+    ]
+    return FakeNode("Both", arms), leaves
 
 
-def test_leaves_of_one_name_are_told_apart_by_the_shortest_path_that_does(story: Story) -> None:
+def test_leaves_of_one_name_are_told_apart_by_the_shortest_path_that_does() -> None:
     root, leaves = two_arms()
-    report, screen = Report(root), Screen(40)
-    view = LiveView(report, screen.console)
-    feed(report, view, story.start(), story.node(root, Status.RUNNING))
+    story, state, screen = Story(root), State(), Screen(40)
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began, story.node(root, Status.RUNNING))
     for leaf in leaves:
         ended = {"outcome": Outcome.SUCCEEDED, "end": End.SUCCEEDED}
-        feed(report, view, story.goal(leaf, "DONE", **ended), story.node(leaf, Status.SUCCESS))
-    view.frame()
+        feed(state, view, story.goal(leaf, "DONE", **ended), story.node(leaf, Status.SUCCESS))
+    view.frame(story.time)
     names = ["Left / Grip / Close", "Right / Grip / Close", "Open", "Right / Close"]
     scrolled = [line for line in screen.lines() if line.startswith("✓")]
     assert [line[2:].partition("  ")[0] for line in scrolled] == names
-    assert [line.partition("  ")[0] for line in last_words(report, Closing(Exit.SUCCESS))[2:6]] == (
-        names
-    )
+    assert [line.partition("  ")[0] for line in last_words(state)[2:6]] == names
     view.close()
 
 
 @pytest.mark.parametrize("lines", [3, 5, 7, 13])
-def test_two_robots_that_do_the_same_are_told_apart_at_40_columns(lines: int, story: Story) -> None:
+def test_two_robots_that_do_the_same_are_told_apart_at_40_columns(lines: int) -> None:
     sides, moves = [], []
     for side in ("left", "right"):
-        move = FakeAction("To the part that lies far away")
-        move.shown = FakeProgress(seconds_left=12.0, deadline="result", feedback=move_feedback())
-        work = Sequence("Pick and place", memory=True, children=[FakeAction("Open"), move])
-        deliver = Selector("Deliver the part", memory=True, children=[work, Success("Recover")])
-        sides.append(Sequence(f"The {side} robot", memory=True, children=[deliver]))
+        move, feedback = moving("To the part that lies far away")
+        work = FakeNode("Pick and place", [FakeAction("Open"), move])
+        recover = FakeNode("Recover", kind="success")
+        deliver = FakeNode("Deliver the part", [work, recover], "fallback")
+        sides.append(FakeNode(f"The {side} robot", [deliver]))
         moves.append(move)
-    root = Sequence("Both robots deliver", memory=True, children=list(sides))
+    story = Story(FakeNode("Both robots deliver", sides), step=0.1)
     screen = Screen(lines + 1 + SCROLLS, width=40)
-    report = Report(root)
-    view = LiveView(report, screen.console)
-    feed(report, view, story.start())
+    state = State()
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began)
     for move in moves:
-        node: Behaviour | None = move
+        node: FakeNode | None = move
         while node is not None:
-            feed(report, view, story.node(node, Status.RUNNING))
+            feed(state, view, story.node(node, Status.RUNNING))
             node = node.parent
-        feed(report, view, story.goal(move, "EXECUTING"))
-    view.frame()
+        feed(state, view, story.goal(move, "EXECUTING"), story.feedback(move, feedback))
+    view.frame(story.time + 17.8)
     drawn = screen.lines()
     assert len(drawn) == lines
     assert max(map(len, drawn)) < 40
@@ -494,19 +665,19 @@ def test_two_robots_that_do_the_same_are_told_apart_at_40_columns(lines: int, st
         assert left <= first < right <= second, drawn
         assert drawn[first].endswith("…")
         if lines >= 7:
-            assert "12 s left" in drawn[first]
+            assert re.search("1[12] s left", drawn[first])
     view.close()
 
 
 @pytest.mark.parametrize("stopping", [False, True])
 def test_the_progress_line_survives_at_40_columns(
-    stopping: bool, root: Behaviour, story: Story
+    stopping: bool, root: FakeNode, story: Story
 ) -> None:
     screen = Screen(24, width=40)
-    view = LiveView(Report(root), screen.console)
+    view = LiveView(story.told(), screen.console)
     if stopping:
         view.say("interrupted")
-    view.frame()
+    view.frame(story.time)
     keys = "again leaves" if stopping else "cancels"
     assert any(line.endswith(f"0.0 s  Ctrl-C {keys}") for line in screen.lines())
     view.close()
@@ -522,14 +693,12 @@ def test_a_dumb_terminal_is_not_drawn_on(environment: dict[str, str], drawn: boo
 
 
 def test_choosing_what_to_show_costs_the_same_in_a_tree_of_100000_nodes() -> None:
-    work = Sequence("work", memory=True)
-    for number in range(100_000):
-        work.children.append(leaf := Success(str(number)))
-        leaf.parent = work
-    nodes = [work, *work.children]
-    position: dict[object, int] = {node.id: number for number, node in enumerate(nodes)}
-    shown, hidden = choose(nodes, position, [work, work.children[50_000]], 8)
-    assert [node.name for node in shown] == [
+    work = FakeNode("work", [FakeNode(str(number)) for number in range(100_000)])
+    state = Story(work).told()
+    nodes = state.in_order()
+    position = {node: number for number, node in enumerate(nodes)}
+    shown, hidden = choose(state, nodes, position, [1, work.children[50_000].id], 8)
+    assert [state.nodes[node].node.name for node in shown] == [
         "work",
         "50000",
         "50001",
@@ -541,52 +710,15 @@ def test_choosing_what_to_show_costs_the_same_in_a_tree_of_100000_nodes() -> Non
     assert hidden == len(nodes) - 7
 
 
-# Messages in words
-
-
-def test_a_message_in_words_shows_constants_by_name() -> None:
-    from robot_control_interfaces.action import Gripper, MoveRobot
-
-    result = MoveRobot.Result(final_pose=2.0, status=MoveRobot.Result.STATUS_FAULT, message="hot")
-    assert fields_in_words(result) == "final_pose 2.00, status FAULT, message hot"
-    assert fields_in_words(Gripper.Feedback(stalled=True)).startswith("position 0.00, stalled true")
-    assert "  status: 3  # FAULT" in result_lines(result)
-
-
-LARGE = [7] * 1_000_000
-
-
-def test_reports_and_the_live_view_shorten_long_values_and_json_has_them_whole(
-    tmp_path: Path, story: Story
+def test_why_a_tree_that_has_ended_is_not_over_is_said_once_also_where_nothing_is_drawn(
+    root: FakeNode, leaves: list[FakeNode], story: Story
 ) -> None:
-    from robot_control_interfaces.action import MoveRobot
-    from test_msgs.action import Fibonacci
-
-    path = tmp_path / "tree.yaml"
-    path.write_text("tree: t\noutputs: {many: 'int32[]', text: string}\nroot: {success: Done}\n")
-    root = load_tree(path)
-    getattr(root, LOADED).scope.write_all({"many": LARGE, "text": "x" * 1_000_000})
-    report = Report(root)
-    report.observe(story.finish(Status.SUCCESS))
-    assert last_words(report, Closing(Exit.SUCCESS))[1:3] == [
-        "many: [7, 7, 7, … 1000000 items]",
-        f"text: {'x' * 131} … {'x' * 66}",
-    ]
-    *_, finished = objects_of(root, [story.start()])
-    assert finished["outputs"] == {"many": LARGE, "text": "x" * 1_000_000}
-    result = result_lines(Fibonacci.Result(sequence=LARGE))
-    assert result == ["  sequence:", "  - 7", "  - 7", "  - 7", "  - … 1000000 items"]
-    result = MoveRobot.Result(message="x" * 1_000_000)
-    assert fields_in_words(result).endswith(f", message {'x' * 51} … {'x' * 26}")
-
-
-def test_without_a_result_there_are_no_lines() -> None:
-    assert result_lines(None) == []
-
-
-def test_numbers_that_json_has_no_word_for_are_null() -> None:
-    out = io.StringIO()
-    view = JsonView(Report(FakeAction("Move")), out)
-    view._write({"outputs": {"n": math.nan, "all": [1.0, -math.inf]}, "duration": 2.5})
-    expected = {"outputs": {"n": None, "all": [1.0, None]}, "duration": 2.5}
-    assert json.loads(out.getvalue(), parse_constant=pytest.fail) == expected
+    late = {"outcome": Outcome.ACCEPT_TIMEOUT, "end": End.UNKNOWN}
+    lines = Lines(story.began, story.goal(leaves[0], "CANCELING", **late))
+    lines.feed(story.node(root, Status.FAILURE))
+    lines.feeding.frame(story.time + 0.5)
+    said = "waiting to know the end of 1 goal: Step 0 on move_robot; Ctrl-C twice leaves"
+    assert said not in lines.out.getvalue()
+    story.time += 5.0
+    lines.feed(story.finish(Status.FAILURE))
+    assert lines.out.getvalue().count(said) == 1

@@ -190,7 +190,8 @@ def test_timeout_waits_for_the_end_of_the_goal_it_stopped_but_not_for_ever(
     assert runner.run() is Status.SUCCESS
     stopped = root.children[0]
     assert stopped.feedback_message == told
-    changes = [each for each in runner.events if isinstance(each, NodeChanged)]
-    ends = [each.time for each in changes if each.node is stopped and each.status is Status.FAILURE]
+    number = runner.state.nodes[1].children[0]
+    changes = [e for e in runner.events if isinstance(e, NodeChanged) and e.node == number]
+    ends = [each.at.steady for each in changes if each.status is Status.FAILURE]
     assert ends == pytest.approx([ended_at], abs=0.5)
     assert len(runner.unaccounted) == len(server.live_goals) == (1 if "known" in told else 0)

@@ -24,7 +24,9 @@ class Stepped:
         self.told: list[Event] = []
         self.backend = MagicMock(spec=Backend, traffic=MagicMock())
         self.traffic = self.backend.traffic
-        self.traffic.host.steady = lambda: self.now
+        self.traffic.host.steady = self.traffic.host.wall = lambda: self.now
+        self.traffic.host.new_goal_id = lambda: bytes(16)
+        self.backend.stamp = lambda: int(self.now * 1e9)
         self.loop = TickLoop(
             tree if isinstance(tree, BehaviourTree) else BehaviourTree(tree),
             self.backend,

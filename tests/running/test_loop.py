@@ -13,11 +13,12 @@ from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions import TreeError
-from bt_actions.events import NodeChanged, TreeFinished
+from bt_actions.events import TreeFinished
 from bt_actions.running import loop as module
 from bt_actions.running.loop import BURST
 from bt_actions.utilities.stepping import Done, Sleep
 from tests.running.stepping import Stepped
+from tests.support.stories import changes_of
 from tests.support.trees import Gate, Guard, Raises, in_sequence, in_turn, together
 
 
@@ -261,7 +262,7 @@ class TestEvents:
             ends.holds = True
             with pytest.raises(TreeError, match="bad: tick raised RuntimeError: on purpose"):
                 stepped.step()
-        told = {e.path[-1]: e.status for e in stepped.told if isinstance(e, NodeChanged)}
+        told = {path[-1]: status for path, status in changes_of(stepped.told)}
         stopped = ["root", "branch", "together", "before", "bad", "behind"]
         assert {each: told[each] for each in stopped} == dict.fromkeys(stopped, Status.INVALID)
         assert told["ends"] is (Status.FAILURE if when == "at the end" else Status.SUCCESS)

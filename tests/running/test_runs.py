@@ -13,8 +13,9 @@ from py_trees.trees import BehaviourTree
 from robot_control_interfaces.action import MoveRobot as Move
 
 from bt_actions import End, MoveRobot, Outcome, Retry, Timeouts, TreeError
-from bt_actions.events import Event, GoalChanged, NodeChanged, TreeFinished
+from bt_actions.events import Event, GoalChanged, TreeFinished
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
+from tests.support.stories import changes_of
 from tests.support.trees import Gate, in_sequence, state, together
 
 
@@ -140,7 +141,7 @@ class TestItsEnd:
         assert last.status is Status.INVALID
         goal = stage.goals[-1]
         assert (goal.state, goal.outcome, goal.end) == ("DONE", "CANCELED", "CANCELED")
-        changes = {e.path: e.status for e in stage.runner.events if isinstance(e, NodeChanged)}
+        changes = dict(changes_of(stage.runner.events))
         assert changes == {("root",): Status.INVALID, ("root", "m"): Status.INVALID}
 
     def test_a_terminate_of_an_action_that_raises_keeps_no_goal_from_its_drain(self) -> None:
@@ -196,7 +197,7 @@ class TestPause:
         stage.run_until(first, "EXECUTING")
         stage.loop.pause(True)
         stage.runner.advance(60.0)
-        assert {goal.behaviour for goal in stage.goals} == {first}
+        assert [action.node.name for action in stage.runner.state.actions] == ["first"]
         assert stage.goals[-1].outcome is Outcome.SUCCEEDED
         stage.loop.pause(False)
         assert stage.runner.advance(3.0) is Status.SUCCESS

@@ -7,7 +7,6 @@ tree. What the server tells at the end is shown as if the tree had run here.
 from __future__ import annotations
 
 import argparse
-import functools
 import os
 import sys
 import uuid
@@ -73,22 +72,21 @@ def run(args: argparse.Namespace) -> int:
     from bt_actions.cli.views.served_run import CallJsonView, CallView, rejection
     from bt_actions.goals.policy import Outcome
 
-    @functools.cache  # asked once, when somebody wants to know
-    def rejected() -> tuple[Exit, str] | None:
-        return rejection(goal_name) if leaf.outcome is Outcome.REJECTED else None
+    def judge(code: Exit) -> tuple[Exit, str]:
+        rejected = code is Exit.FAILURE and leaf.outcome is Outcome.REJECTED
+        return rejection(goal_name) if rejected else (code, "")
 
     with Session(leaf, namespace=args.namespace, name=name) as session:
-        view: View = CallView(session.report, leaf, sys.stdout, feedback=True)
+        view: View = CallView(session.state, sys.stdout, feedback=True)
         if args.json:
-            view = as_json = session.json_view(CallJsonView)
-            as_json.rejection = rejected
+            view = session.json_view(CallJsonView)
         elif args.quiet:
-            view = QuietView(session.report, sys.stdout)
-        code = session.run(view, timeout=args.timeout)
-    if code is not Exit.FAILURE or not (why := rejected()):
-        return code
-    note(f"bt-actions call: {why[1]}")
-    return why[0]
+            view = QuietView(session.state, sys.stdout)
+        code = session.run(view, timeout=args.timeout, judge=judge)
+    ended = session.state.ended
+    if ended is not None and ended.error and leaf.outcome is Outcome.REJECTED:
+        note(f"bt-actions call: {ended.error}")
+    return code
 
 
 def _leaf(tree: str, server: str, inputs: dict[str, object], goal_name: str) -> RunTree:

@@ -77,9 +77,9 @@ def run(args: argparse.Namespace) -> int:
     from bt_actions.cli.views.view import View
 
     with Session(leaf, namespace=args.namespace, name=name) as session:
-        view: View = GoalView(session.report, leaf, sys.stdout, feedback=args.feedback)
+        view: View = GoalView(session.state, sys.stdout, feedback=args.feedback)
         if args.quiet:
-            view = QuietView(session.report, sys.stdout)
+            view = QuietView(session.state, sys.stdout)
         return session.run(view, timeout=args.timeout)
 
 

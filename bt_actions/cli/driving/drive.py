@@ -1,4 +1,4 @@
-"""Drives one run from the main thread: waits for events and signals, feeds report and view.
+"""Drives one run from the main thread: waits for events and signals, feeds state and view.
 
 The tree ticks on its own threads. Here is decided what ends a run from outside (a signal, the
 --timeout, a closed standard output), and what exit code it all makes. Never touches a behaviour.
@@ -7,21 +7,18 @@ The tree ticks on its own threads. Here is decided what ends a run from outside 
 from __future__ import annotations
 
 import contextlib
-import functools
-import math
 import os
-import queue
 import stat
 import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from signal import Signals as Signal
 from typing import Protocol
 
 from py_trees.common import Status
 
+from bt_actions.cli.driving.feed import Feed
 from bt_actions.cli.driving.signals import SAME_WISH, Signals
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.streams.patient_output import PatientOutput
@@ -29,11 +26,10 @@ from bt_actions.cli.streams.results import results
 from bt_actions.cli.streams.writing import discard_stdout, note
 from bt_actions.cli.views.lines import QuietView
 from bt_actions.cli.views.view import View
-from bt_actions.cli.views.words import Closing, waiting_text
-from bt_actions.events import Event
-from bt_actions.goals.unaccounted import GoalReport
-from bt_actions.running.loop import UnusableTree
-from bt_actions.running.report import Report
+from bt_actions.events import RunEnded, StopWanted
+from bt_actions.events.stream import Stream
+from bt_actions.running.telling import where_raised
+from bt_actions.story.state import State
 
 FRAME = 0.1
 """Seconds between two drawings where nothing happens."""
@@ -41,54 +37,22 @@ PATIENCE_WHEN_LEFT = 1.0
 """Seconds for the output to be written where the user did not wait for the goals."""
 NEARLY_OVER = 1.0
 """Seconds for a run with no goal left to wait for to be over, where the user will not wait."""
-SOON = 1.0
-"""Seconds after the end of the tree for which nothing is said of goals that have not ended."""
 _LOOK = 0.02
 """Seconds between two looks for signals while only the output is waited for."""
 
-_EXITS = {
-    Signal.SIGHUP: Exit.SIGHUP,
-    Signal.SIGINT: Exit.SIGINT,
-    Signal.SIGQUIT: Exit.SIGQUIT,
-    Signal.SIGTERM: Exit.SIGTERM,
-}
+Judge = Callable[[Exit], tuple[Exit, str]]
+"""What a command makes of the exit code: another one, and what is wrong with what was asked for."""
 
 
 class Runner(Protocol):
     """What this file needs of whoever runs the tree."""
 
-    def observe(self, callback: Callable[[Event], None]) -> object:
-        """Call `callback` with each event, on the ticking thread."""
+    @property
+    def stream(self) -> Stream:
+        """What happens in the run."""
 
     def interrupt(self, *, abandon: bool = False) -> None:
         """Make the run drain and return; with `abandon`, drain no longer."""
-
-    def catch_up(self) -> None:
-        """Tell what became of goals while a behaviour does not return from its tick."""
-
-    @property
-    def unaccounted(self) -> list[GoalReport]:
-        """The goals whose end is not known."""
-
-
-@dataclass(slots=True)
-class _Stop:
-    """Why the run was ended from outside."""
-
-    code: Exit
-    cause: str
-    at: float
-
-
-@dataclass(slots=True)
-class Ended:
-    """How a run ended."""
-
-    code: Exit
-    cause: str
-    abandoned: bool
-    """The user did not wait for the goals to end: threads are still running."""
-    error: BaseException | None
 
 
 class Drive:
@@ -98,7 +62,7 @@ class Drive:
         self,
         runner: Runner,
         tick_to_end: Callable[[], object],
-        report: Report,
+        state: State,
         view: View,
         signals: Signals,
         *,
@@ -111,62 +75,57 @@ class Drive:
         self._runner = runner
         self._tick_to_end = tick_to_end
         self._output = output
-        self._report = report
-        self._view = view
+        self._feed = Feed(state, view, self._show)
+        self._state = state
         self._signals = signals
         self._timeout = timeout
         self._deadline: float | None = None
         self._clock = clock
-        self._events: queue.SimpleQueue[Event] = queue.SimpleQueue()
+        self._events = runner.stream.reader(signals.poke)
         self._finished = threading.Event()
         self._error: BaseException | None = None
-        self._stop: _Stop | None = None
-        self._abandoned = False
-        self._waits_since: float | None = None
-        """When the tree was first seen to have ended; NaN once it is said what is waited for."""
+        self._stopped_at: float | None = None
+        """When the run was first asked to end."""
+        self.abandoned = False
+        """The user did not wait for the goals to end: threads are still running."""
         self._lost = False
         """Whether something could not be shown."""
         self._watched = _pipe_of_stdout()
-        runner.observe(self._observe)
 
-    def run(self) -> Ended:
-        """Run the tree to its end; return how it ended. Main thread only."""
+    def run(self) -> None:
+        """Run the tree to its end. Main thread only."""
         thread = threading.Thread(target=self._tree, name="tree", daemon=True)
         began = self._clock()
         deadline = None if self._timeout is None else began + self._timeout
         self._deadline = deadline
         thread.start()
         drawn = began - FRAME
-        while not self._abandoned:
-            finished = self._finished.is_set()  # asked before the queue is emptied
+        while not self.abandoned:
+            finished, now = self._finished.is_set(), self._clock()  # before the queue is emptied
             self._take_events()
             if finished:
                 thread.join()
                 break
-            now = self._clock()
-            if self._stop is not None or self._report.finished:
+            if self._stopped_at is not None or self._state.finished is not None:
                 deadline = None  # there is nothing left to end
             if deadline is not None and now >= deadline:
-                self._end(Exit.TIMEOUT, f"--timeout {self._timeout:g} s expired", now)
-            self._say_what_is_waited_for(now)
+                self._end(Exit.TIMEOUT, f"--timeout {self._timeout:g} s expired")
             if now - drawn >= FRAME:
-                self._show(self._view.frame)
+                self._feed.frame(now)
                 drawn = now
             wait = max(0.0, drawn + FRAME - now)
             if deadline is not None:
                 wait = min(wait, max(0.0, deadline - now))
             received, ready = self._signals.wait(
-                wait, readable=self._view.fileno, writable=self._watched
+                wait, readable=self._feed.view.fileno, writable=self._watched
             )
             self._take_events()  # what happened before the signal
             for signal in received:
                 self._signalled(signal)
             if self._watched in ready:
                 self._nobody_reads()
-        if self._abandoned:
+        if self.abandoned:
             self._await_the_list()
-        self._settle()
-        return Ended(self._code(), self._cause(), self._abandoned, self._error)
 
     def _tree(self) -> None:
         try:
@@ -177,47 +136,23 @@ class Drive:
             self._finished.set()
             self._signals.poke()
 
-    def _observe(self, event: Event) -> None:
-        self._events.put(event)
-        self._signals.poke()
-
     def _take_events(self) -> None:
-        while True:
-            try:
-                event = self._events.get_nowait()
-            except queue.Empty:
-                return
-            self._report.observe(event)
-            self._show(functools.partial(self._view.event, event))
+        while events := self._events.take():
+            for event in events:
+                self._feed.event(event)
 
     def _signalled(self, signal: Signal) -> None:
-        now = self._clock()
-        if self._stop is None:
-            self._end(_EXITS[signal], f"interrupted by {signal.name}", now)
-        elif now - self._stop.at > SAME_WISH:
-            self._abandoned = True
+        if self._stopped_at is None:
+            self._end(Exit[signal.name], f"interrupted by {signal.name}")
+        elif self._clock() - self._stopped_at > SAME_WISH:
+            self.abandoned = True
 
-    def _say_what_is_waited_for(self, now: float) -> None:
-        """Say once why a tree that has ended is not over."""
-        if not self._report.decided or self._report.finished or self._stop is not None:
-            return
-        if self._waits_since is None:
-            self._waits_since = now
-        if now - self._waits_since >= SOON and (text := waiting_text(self._report)):
-            self._waits_since = math.nan
-            self._show(lambda: self._view.say(f"{text}; Ctrl-C twice leaves without waiting"))
-
-    def _end(self, code: Exit, cause: str, now: float) -> None:
+    def _end(self, code: Exit, cause: str) -> None:
         """End the run from outside; the first reason stands."""
-        self._stop = _Stop(code, cause, now)
+        self._stopped_at = self._clock()
+        self._runner.stream.add(StopWanted, code.name, cause)
+        self._take_events()
         self._runner.interrupt()
-        live = len(self._report.live)
-        goals = "1 goal" if live == 1 else f"{live} goals"
-        again = "Ctrl-C again leaves without waiting"
-        more = f": canceling {goals}; {again}" if live else ""
-        if not live and (waiting := waiting_text(self._report)):
-            more = f": {waiting}; {again}"
-        self._show(lambda: self._view.say(f"{cause}{more}"))
 
     def _show(self, draw: Callable[[], None]) -> None:
         """Let the view draw; a view that fails is given up, and the robot goes on."""
@@ -227,8 +162,8 @@ class Drive:
             self._nobody_reads()
         except Exception as error:  # noqa: BLE001 - a full disk, a bug: no reason to drop a goal
             with contextlib.suppress(Exception):
-                self._view.close()
-            self._view = QuietView(self._report, sys.stderr)
+                self._feed.view.close()
+            self._feed.view = QuietView(self._state, sys.stderr)
             self._lost = True
             if isinstance(error, OSError):
                 discard_stdout()
@@ -240,22 +175,21 @@ class Drive:
         with contextlib.suppress(OSError):
             results().flush()
         discard_stdout()
-        if self._stop is None:
-            self._end(Exit.SIGPIPE, "standard output was closed", self._clock())
+        if self._stopped_at is None:
+            self._end(Exit.SIGPIPE, "standard output was closed")
 
     def _await_the_list(self) -> None:
         """Let the runner say how its goals stand, which takes a moment, but not for long."""
         self._runner.interrupt(abandon=True)
         began = self._clock()
-        while not self._report.finished:
-            left = began + (SAME_WISH if self._report.live else NEARLY_OVER) - self._clock()
+        while self._state.finished is None:
+            left = began + (SAME_WISH if self._state.live else NEARLY_OVER) - self._clock()
             if left <= 0.0:
                 break
             self._signals.wait(min(left, SAME_WISH))
             self._take_events()
-        if not self._report.finished:
-            self._runner.catch_up()
-            self._take_events()
+        self._runner.stream.add(StopWanted, "again", "left without waiting", leaves=True)
+        self._take_events()
 
     def _await_readers(self) -> None:
         """Let who reads slowly get everything; a signal, or the --timeout, ends the wait.
@@ -264,14 +198,14 @@ class Drive:
         """
         if self._output is None:
             return
-        until = self._deadline if self._stop is None else None
-        if self._abandoned:
+        until = self._deadline if self._stopped_at is None else None
+        if self.abandoned:
             until = self._clock() + PATIENCE_WHEN_LEFT
         elif until is not None and until <= self._clock():
             until = None
         while not self._all_is_written(self._output):
             now = self._clock()
-            again = self._stop is None or now - self._stop.at > SAME_WISH
+            again = self._stopped_at is None or now - self._stopped_at > SAME_WISH
             if (self._signals.wait(0.0)[0] and again) or (until is not None and now >= until):
                 return
 
@@ -280,45 +214,56 @@ class Drive:
         self._show(lambda: done.append(output.written(_LOOK)))
         return any(done)
 
-    def _settle(self) -> None:
-        """Ask which goals have no known end."""
-        goals = {goal.goal_id: goal for goal in self._runner.unaccounted}
-        if self._abandoned:
-            for row in self._report.live:
-                name = self._report.called(row.behaviour)
-                for goal_id, state in row.live.items():
-                    why = f"{state.lower()} when left"
-                    report = GoalReport(name, row.server, goal_id, row.outcome, why)
-                    goals.setdefault(goal_id, report)
-                row.leave(self._report.now)
-        self._report.unaccounted = [str(goal) for goal in goals.values()]
+    def finish(
+        self, world: str = "", complaint: str = "", judge: Judge = lambda code: (code, "")
+    ) -> Exit:
+        """Show the end; return the exit code. A success that nobody could be told is none.
 
-    def _code(self) -> Exit:
-        if self._report.unaccounted or (self._abandoned and not self._report.finished):
-            return Exit.UNKNOWN
-        if self._stop is not None:
-            return self._stop.code
-        if isinstance(self._error, UnusableTree):
-            return Exit.BAD_INPUT
-        if self._error is not None or self._report.status is not Status.SUCCESS:
-            return Exit.FAILURE
-        return Exit.SUCCESS
-
-    def _cause(self) -> str:
-        left = ", left without waiting" if self._abandoned else ""
-        return f"{self._stop.cause}{left}" if self._stop else ""
-
-    def finish(self, closing: Closing) -> Exit:
-        """Show the end; return the exit code. A success that nobody could be told is none."""
-        code = closing.exit_code
-        self._show(lambda: self._view.finish(closing))
+        `world` and `complaint` are what the simulation says in the end.
+        """
+        told = self._state.finished is not None and bool(self._state.finished.error)
+        raised = self._error is not None and not told
+        code, error = judge(code_of(self._state, raised=raised, complaint=complaint))
+        if raised and self._error is not None:
+            error = where_raised(self._error)
+        self._runner.stream.add(
+            RunEnded,
+            int(code),
+            cause_of(self._state),
+            error,
+            tuple(self._state.unaccounted),
+            world,
+            complaint,
+        )
+        self._take_events()
+        self._show(self._feed.view.finish)
         self._await_readers()
         if self._lost and code is Exit.SUCCESS:
             note("bt-actions: the tree has succeeded; exit code 1, as that could not be shown")
             code = Exit.FAILURE
-        if self._stop is not None and self._stop.code is Exit.SIGPIPE and code is not Exit.UNKNOWN:
+        stop = self._state.stop
+        if stop is not None and stop.who == Exit.SIGPIPE.name and code is not Exit.UNKNOWN:
             return Exit.SIGPIPE
         return code
+
+
+def code_of(state: State, *, raised: bool = False, complaint: str = "") -> Exit:
+    """Return the exit code of a run; `raised`: it could not even be begun, or drained."""
+    if state.unaccounted or (state.left and state.finished is None):
+        return Exit.UNKNOWN
+    if state.stop is not None:
+        return Exit[state.stop.who]
+    if state.finished is not None and state.finished.unusable:
+        return Exit.BAD_INPUT
+    failed = raised or state.finished is None or bool(state.finished.error) or complaint
+    return Exit.FAILURE if failed or state.status is not Status.SUCCESS else Exit.SUCCESS
+
+
+def cause_of(state: State) -> str:
+    """Say why a run did not end by itself, or ""."""
+    if state.stop is None:
+        return ""
+    return f"{state.stop.why}{', left without waiting' if state.left else ''}"
 
 
 def _pipe_of_stdout() -> int:

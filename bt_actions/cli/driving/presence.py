@@ -12,11 +12,11 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.cli.streams.writing import note
-from bt_actions.cli.views.table import summary
-from bt_actions.cli.views.words import brief
-from bt_actions.document import given_inputs, place_of, tree_name
-from bt_actions.events import Event, TreeStarted
-from bt_actions.running.report import Report
+from bt_actions.document import given_inputs
+from bt_actions.events import Event, RunBegan
+from bt_actions.story.state import State
+from bt_actions.story.values import brief
+from bt_actions.story.why import causes
 from bt_actions.utilities.plain_text import clean, in_words
 
 if TYPE_CHECKING:
@@ -32,17 +32,10 @@ class Presence:
         from bt_actions.ros.rosout import Rosout
 
         self._runner = runner
-        self._report = Report(root)  # of its own: the views' is read on the main thread
-        self._name = tree_name(root)
+        self._state = State()  # of its own: the views' is read on the main thread
         self._begun = self._closed = False
         self._once = threading.Lock()
-        given = given_inputs(root)
-        words = [f"{name}={brief(value)}" for name, (_, value) in given.items()]
-        place = place_of(root)
-        where = f" ({place.file})" if place else ""
-        what = f"{self._name}{where} begins{' with ' if words else ''}{', '.join(words)}"
-        self._begins = clean(brief(what))
-        for name, (each, value) in given.items():
+        for name, (each, value) in given_inputs(root).items():
             unit = f" ({each.unit})" if each.unit else ""
             kind = parse_type(each.type)
             description = f"{each.description}{unit}".strip()
@@ -53,10 +46,14 @@ class Presence:
         runner.observe(self._observe)
 
     def _observe(self, event: Event) -> None:
-        self._report.observe(event)
-        if isinstance(event, TreeStarted):
+        self._state.observe(event)
+        if isinstance(event, RunBegan):
             self._begun = True
-            self._rosout.say("info", self._begins)
+            words = [f"{name}={brief(value)}" for name, value in event.inputs.items()]
+            file = event.nodes[0].place.rsplit(":", 2)[0]
+            where = f" ({file})" if file else ""
+            what = f"{event.tree}{where} begins{' with ' if words else ''}{', '.join(words)}"
+            self._rosout.say("info", clean(brief(what)))
 
     def close(self, *, left: bool = False, error: BaseException | None = None) -> None:
         """Say how the run has ended; `left`: without waiting for its goals. Once is enough."""
@@ -67,16 +64,16 @@ class Presence:
         if not self._begun:
             self._rosout.close()
             return
-        status = self._report.status
-        failed = "\n".join(summary(self._report)) if error is None else in_words(error)
+        state, name = self._state, self._state.tree
+        failed = "\n".join(causes(state)) if error is None else in_words(error)
         if failed:
-            self._rosout.say("error", f"{self._name}: {failed}")
-        word = status.value if status is not Status.INVALID else "STOPPED"
+            self._rosout.say("error", f"{name}: {failed}")
+        word = state.status.value if state.status is not Status.INVALID else "STOPPED"
         unaccounted = self._runner.unaccounted
         for goal in unaccounted:
-            self._rosout.say("error", f"{self._name}: not accounted for: {goal}")
-        text = f"{self._name} ends: {word} after {self._report.elapsed():.2f} s"
+            self._rosout.say("error", f"{name}: not accounted for: {goal}")
+        text = f"{name} ends: {word} after {state.elapsed:.2f} s"
         text += ", left without waiting for its goals" if left else ""
-        wrong = left or unaccounted or failed or status is Status.FAILURE
+        wrong = left or unaccounted or failed or state.status is Status.FAILURE
         self._rosout.say("error" if wrong else "info", text)
         self._rosout.close()

@@ -10,14 +10,13 @@ import contextlib
 import json
 import logging
 import sys
-import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from py_trees.behaviour import Behaviour
 
-from bt_actions.cli.driving.drive import Drive, Ended
+from bt_actions.cli.driving.drive import Drive, Judge
 from bt_actions.cli.driving.presence import Presence
 from bt_actions.cli.driving.signals import Signals
 from bt_actions.cli.driving.simulated import Wanted, remark, wanted
@@ -29,8 +28,7 @@ from bt_actions.cli.streams.writing import note
 from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.lines import LineView
 from bt_actions.cli.views.view import View
-from bt_actions.cli.views.words import Closing
-from bt_actions.running.report import Report
+from bt_actions.story.state import State
 
 if TYPE_CHECKING:
     from bt_actions.ros.naming import Outlook
@@ -72,7 +70,7 @@ class Session:
             import bt_actions.ros.spinning  # noqa: F401 - the runner imports it late
         from bt_actions.running.runner import TreeRunner as Runner
 
-        self.report = Report(root)
+        self.state = State()
         with starting_ros():
             self._runner = Runner(
                 root,
@@ -121,13 +119,13 @@ class Session:
 
             console = Console(highlight=False, markup=False, emoji=False)
             if suits(console):
-                return LiveView(self.report, console)
-        return LineView(self.report, sys.stdout, verbose=verbose)
+                return LiveView(self.state, console)
+        return LineView(self.state, sys.stdout, verbose=verbose)
 
     def json_view(self, kind: type[Json]) -> Json:
         """Return a view for programs, which are told of lines that they were too slow for."""
         self._output.tell_gaps(_gap_object)
-        return kind(self.report, results())
+        return kind(self.state, results())
 
     def run(
         self,
@@ -135,6 +133,7 @@ class Session:
         *,
         timeout: float | None = None,
         part_at: float | None = None,
+        judge: Judge = lambda code: (code, ""),
     ) -> Exit:
         """Run to the end, show it all, return the exit code; does not return when abandoned."""
         try:
@@ -144,15 +143,15 @@ class Session:
                 drive = Drive(
                     self._runner,
                     self._tick_to_end,
-                    self.report,
+                    self.state,
                     view,
                     signals,
                     timeout=timeout,
                     output=self._output,
                 )
-                ended = drive.run()
-                code = drive.finish(self._close(ended, part_at))
-                if ended.abandoned:
+                drive.run()
+                code = drive.finish(*self._world(part_at), judge)
+                if drive.abandoned:
                     self._presence.close(left=True)
                     leave(code)
                 signals.settle(code)
@@ -173,12 +172,10 @@ class Session:
         finally:
             self._runner.shutdown()
 
-    def _close(self, ended: Ended, part_at: float | None) -> Closing:
-        """Let the simulated world say what became of the part, and settle the exit code."""
-        error = _bug(ended.error)
+    def _world(self, part_at: float | None) -> tuple[str, str]:
+        """Return what the simulated world looks like, and what is not as it should be."""
         if self._simulator is None or not self._simulator.parts:
-            return Closing(ended.code, ended.cause, error=error)
-        verdict = self._simulator.said
+            return "", ""
         wrong = [
             namespace
             for namespace, part in self._simulator.parts.items()
@@ -186,11 +183,10 @@ class Session:
             and (part.held_by is not None or abs(part.position - part_at) > PART_TOLERANCE)
         ]
         if not wrong:
-            return Closing(ended.code, ended.cause, verdict, error=error)
-        code = Exit.FAILURE if ended.code is Exit.SUCCESS else ended.code
+            return self._simulator.said, ""
         which = "The part" if len(self._simulator.parts) == 1 else f"The part of {', '.join(wrong)}"
         complaint = f"{which} should lie at {part_at:.2f} m (--check-part)."
-        return Closing(code, ended.cause, verdict, complaint, error)
+        return self._simulator.said, complaint
 
 
 class _Simulator:
@@ -239,15 +235,3 @@ def _is_news(record: logging.LogRecord) -> bool:
 
 def _gap_object(lines: int) -> str:
     return json.dumps({"event": "note", "text": gap_text(lines).strip()}) + "\n"
-
-
-def _bug(error: BaseException | None) -> str:
-    """One line about an exception in a behaviour, with the place in the user's code."""
-    if error is None:
-        return ""
-    from bt_actions.running.loop import TreeError
-
-    cause = error.__cause__ or error
-    frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)
-    where = f" ({frames[-1].filename}:{frames[-1].lineno})" if frames else ""
-    return f"{error}{where}"

@@ -6,15 +6,12 @@ import itertools
 from collections import Counter
 from collections.abc import Iterator
 
-from py_trees.behaviour import Behaviour
+from bt_actions.story.state import State
 
 
 def choose(
-    nodes: list[Behaviour],
-    position: dict[object, int],
-    running: list[Behaviour],
-    most: int,
-) -> tuple[list[Behaviour], int]:
+    state: State, nodes: list[int], position: dict[int, int], running: list[int], most: int
+) -> tuple[list[int], int]:
     """Return at most `most` lines' worth of nodes in tree order, and how many are left out.
 
     First what runs, then of what holds it that which tells running branches apart, then the rest
@@ -24,18 +21,18 @@ def choose(
     if len(nodes) <= most:
         return nodes, 0
     room = most - 1
-    chosen: dict[object, Behaviour] = {}
-    chains = branches(running, position)
+    chosen: set[int] = set()
+    chains = branches(state, running, position)
 
-    def take(node: Behaviour) -> None:
-        if len(chosen) < room and node.id in position:
-            chosen.setdefault(node.id, node)
+    def take(node: int) -> None:
+        if len(chosen) < room and node in position:
+            chosen.add(node)
 
     for chain in chains:
         take(chain[0])
     forks = fork_of(chains)
     for chain in chains:
-        if (fork := forks.get(chain[0].id)) is not None:
+        if (fork := forks.get(chain[0])) is not None:
             take(fork)
     for rank in range(max((len(chain) for chain in chains), default=0)):
         for chain in chains:
@@ -45,40 +42,49 @@ def choose(
             break
     for chain in chains:
         for node in chain:
-            for sibling in _after(node):
+            for sibling in _after(state, node):
                 if len(chosen) >= room:
                     break
                 take(sibling)
-    for node in _around(nodes, position[chains[0][0].id] if chains else 0, 8 * most):
+    for node in _around(nodes, position[chains[0][0]] if chains else 0, 8 * most):
         if len(chosen) >= room:
             break
         take(node)
-    shown = sorted(chosen.values(), key=lambda node: position[node.id])
+    shown = sorted(chosen, key=position.__getitem__)
     return shown, len(nodes) - len(shown)
 
 
-def branches(running: list[Behaviour], position: dict[object, int]) -> list[list[Behaviour]]:
+def branches(state: State, running: list[int], position: dict[int, int]) -> list[list[int]]:
     """Return what runs at the tips, in tree order, each with all that holds it, upwards."""
-    active = {node.id for node in running}
-    tips = [node for node in running if not any(child.id in active for child in node.children)]
-    tips.sort(key=lambda node: position[node.id])
-    return [list(_upwards(tip)) for tip in tips]
+    active = set(running)
+    tips = [node for node in running if active.isdisjoint(state.nodes[node].children)]
+    tips.sort(key=position.__getitem__)
+    return [[tip, *(above.node.id for above in state.above(tip))] for tip in tips]
 
 
-def fork_of(chains: list[list[Behaviour]]) -> dict[object, Behaviour]:
+def fork_of(chains: list[list[int]]) -> dict[int, int]:
     """Return for each tip the lowest node above it where its branch leaves another one."""
-    below = Counter(node.id for chain in chains for node in chain)
-    forks: dict[object, Behaviour] = {}
+    branches_at = Counter(node for chain in chains for node in chain)
+    forks: dict[int, int] = {}
     for chain in chains:
         for node, above in itertools.pairwise(chain):
-            if below[node.id] < below[above.id]:
-                if node is not chain[0]:
-                    forks[chain[0].id] = node
+            if branches_at[node] < branches_at[above]:
+                if node != chain[0]:
+                    forks[chain[0]] = node
                 break
     return forks
 
 
-def _around(nodes: list[Behaviour], at: int, most: int) -> Iterator[Behaviour]:
+def below(state: State, node: int) -> Iterator[int]:
+    """Yield all nodes below one."""
+    waiting = list(state.nodes[node].children)
+    while waiting:
+        child = waiting.pop()
+        waiting += state.nodes[child].children
+        yield child
+
+
+def _around(nodes: list[int], at: int, most: int) -> Iterator[int]:
     """Yield nodes by their distance from place `at`, those after it first."""
     for distance in range(1, most):
         if at + distance < len(nodes):
@@ -87,21 +93,10 @@ def _around(nodes: list[Behaviour], at: int, most: int) -> Iterator[Behaviour]:
             yield nodes[at - distance]
 
 
-def _upwards(node: Behaviour | None) -> list[Behaviour]:
-    chain = []
-    while node is not None:
-        chain.append(node)
-        node = node.parent
-    return chain
-
-
-def _after(node: Behaviour) -> list[Behaviour]:
-    if node.parent is None:
+def _after(state: State, node: int) -> list[int]:
+    """The siblings that come after a node."""
+    parent = state.nodes[node].node.parent
+    if parent is None:
         return []
-    siblings = node.parent.children
-    return list(siblings[siblings.index(node) + 1 :])
-
-
-def is_below(node: Behaviour, above: Behaviour) -> bool:
-    """Return whether `node` is somewhere below `above`."""
-    return any(other is above for other in _upwards(node.parent))
+    siblings = state.nodes[parent].children
+    return siblings[siblings.index(node) + 1 :]

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TextIO
-from uuid import UUID
+from collections.abc import Mapping
+from typing import Any, TextIO
 
-from py_trees.behaviour import Behaviour
-
-from bt_actions.cli.views.words import Closing, outputs_of
-from bt_actions.document import tree_name
-from bt_actions.events import Event, GoalChanged, NodeChanged, TreeStarted
-from bt_actions.render import kind, rows
-from bt_actions.running.report import Report, Row, place_of
+from bt_actions.events import (
+    AttemptEnded,
+    Cut,
+    Event,
+    GoalChanged,
+    Node,
+    NodeChanged,
+    RoundBegan,
+    RunBegan,
+    StopWanted,
+    Value,
+)
+from bt_actions.events.kinds import FeedbackCame
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.state import Failure, State
+from bt_actions.story.why import why
+from bt_actions.story.words import stopping_text
 from bt_actions.utilities.plain_text import as_json
 
 
@@ -20,135 +30,190 @@ class JsonView:
 
     fileno = -1
 
-    def __init__(self, report: Report, out: TextIO) -> None:
-        self._report = report
+    def __init__(self, state: State, out: TextIO) -> None:
+        self._state = state
         self._out = out
-        self._ids: dict[UUID, int] = {}
-        for row in rows(report.root):
-            self._id(row.node)
+
+    def due(self, now: float) -> None:
+        """Nothing is written for that it lasts."""
 
     def event(self, event: Event) -> None:
-        """Write `event` as an object."""
-        time = round(event.time - self._report.started, 4)
-        if isinstance(event, TreeStarted):
-            root = self._report.root
-            nodes = [self._node(row.node) for row in rows(root)]
-            self._write({"event": "started", "tree": tree_name(root), "nodes": nodes})
-        elif isinstance(event, NodeChanged):
-            self._write(
-                {
-                    "event": "node",
-                    "time": time,
-                    "id": self._id(event.node),
-                    "path": list(event.path),
-                    "status": event.status.value,
-                    "message": event.message,
-                    "place": place_of(event.node) or None,
-                }
-            )
-        elif isinstance(event, GoalChanged):
-            row = self._report.row(event.behaviour)
-            self._write(
-                {
-                    "event": "goal",
-                    "time": time,
-                    "id": self._id(event.behaviour),
-                    "name": row.path[-1],
-                    "path": list(row.path),
-                    "server": row.server,
-                    "goal_id": event.goal_id,
-                    "attempt": event.attempt,
-                    "state": event.state,
-                    "outcome": event.outcome,
-                    "end": event.end,
-                    "reason": event.reason,
-                }
-            )
+        """Write `event` as an object, where it has a view here."""
+        match event:
+            case RunBegan():
+                self._write(
+                    {
+                        "event": "started",
+                        "tree": event.tree,
+                        "run": event.run_id,
+                        "wall": event.at.wall,
+                        "inputs": plain(event.inputs),
+                        "nodes": [_node(node) for node in event.nodes],
+                    }
+                )
+            case NodeChanged():
+                self._of(event, event.node, "node", status=event.status.value,
+                         message=event.message)  # fmt: skip
+            case GoalChanged():
+                self._of(
+                    event,
+                    event.node,
+                    "goal",
+                    name=self._state.nodes[event.node].node.name,
+                    server=event.server,
+                    goal_id=event.goal_id,
+                    attempt=event.attempt,
+                    state=event.state,
+                    outcome=event.outcome,
+                    end=event.end,
+                    reason=event.reason,
+                    goal=plain(event.goal),
+                    result=plain(event.result),
+                )
+            case AttemptEnded():
+                self._of(
+                    event,
+                    event.node,
+                    "attempt",
+                    goal_id=event.goal_id,
+                    attempt=event.attempt,
+                    outcome=event.outcome,
+                    reason=event.reason,
+                    expect=event.expect or None,
+                    seen=plain(event.seen),
+                    again_in=event.again_in,
+                )
+            case FeedbackCame():
+                self._of(event, event.node, "feedback", goal_id=event.goal_id,
+                         feedback=plain(event.feedback))  # fmt: skip
+            case RoundBegan():
+                self._of(event, event.node, "round", round=event.number, of=event.of,
+                         item=plain(event.item))  # fmt: skip
+            case StopWanted(leaves=False):
+                self.say(stopping_text(self._state))
 
-    def frame(self) -> None:
+    def frame(self, now: float) -> None:
         """Nothing changes without an event."""
 
     def say(self, text: str) -> None:
         """Write `text` as a note."""
         self._write({"event": "note", "text": text})
 
-    def finish(self, closing: Closing) -> None:
+    def finish(self) -> None:
         """Write the last object."""
-        self._write(self._finished(closing))
+        self._write(self._finished())
 
-    def _finished(self, closing: Closing) -> dict[str, object]:
-        from bt_actions.messages.conversion import to_plain
-
-        report = self._report
+    def _finished(self) -> dict[str, object]:
+        state = self._state
+        ended, finished = state.ended, state.finished
+        assert ended is not None
+        error = (finished is not None and finished.error) or ended.error
         return {
             "event": "finished",
-            "status": report.status.value,
-            "exit_code": int(closing.exit_code),
-            "cause": closing.cause or None,
-            "error": closing.error or None,
-            "duration": round(report.now - report.started, 3),
-            "outputs": {name: to_plain(value) for name, value in outputs_of(report).items()},
-            "actions": [self._action(row) for row in report.rows],
-            "failures": [
-                {
-                    "id": self._id(culprit.node),
-                    "path": list(culprit.path),
-                    "attempts": culprit.row.attempt if culprit.row else 0,
-                    "outcome": culprit.row.outcome if culprit.row else None,
-                    "reason": (culprit.row.reason if culprit.row else "") or culprit.message,
-                    "place": culprit.place or None,
-                }
-                for culprit in report.culprits()
+            "status": state.status.value,
+            "exit_code": ended.exit_code,
+            "cause": ended.cause or None,
+            "error": error or None,
+            "duration": round(state.elapsed, 3),
+            "outputs": plain(state.outputs),
+            "actions": [action_data(each, state.latest) for each in state.actions],
+            "failures": [self._failure(each) for each in state.failures],
+            "why": why(state),
+            "dealt_with": [
+                self._failure(each) | {"by": each.by.id if each.by is not None else None}
+                for each in state.dealt_with
             ],
             "warnings": [
                 {
-                    "id": self._id(warned.node),
-                    "path": list(warned.path),
-                    "message": warned.message,
-                    "place": warned.place or None,
+                    "id": each.node.id,
+                    "path": list(each.path),
+                    "message": each.message,
+                    "place": each.node.place or None,
                 }
-                for warned in report.warnings
+                for each in state.warnings
             ],
-            "unaccounted": report.unaccounted,
-            "servers_gone": report.servers_gone,
-            "world": closing.verdict or None,
-            "complaint": closing.complaint or None,
+            "unaccounted": list(ended.unaccounted),
+            "servers_gone": state.servers_gone,
+            "world": ended.world or None,
+            "complaint": ended.complaint or None,
         }
 
     def close(self) -> None:
         """Nothing to give back."""
 
-    def _id(self, node: Behaviour) -> int:
-        """Return the number of a node: from 1, parents first; what is inserted later follows."""
-        return self._ids.setdefault(node.id, len(self._ids) + 1)
-
-    def _node(self, node: Behaviour) -> dict[str, object]:
-        return {
-            "id": self._id(node),
-            "parent": None if node.parent is None else self._id(node.parent),
-            "name": node.name,
-            "kind": kind(node),
-            "place": place_of(node) or None,
+    def _of(self, event: Event, node: int, kind: str, **fields: object) -> None:
+        """Write an event of one node."""
+        story = self._state.nodes[node]
+        about = {
+            "event": kind,
+            "time": round(event.at.steady - self._state.started, 4),
+            "wall": event.at.wall,
+            "id": node,
+            "path": list(self._state.path(node)),
         }
+        self._write(about | fields | {"place": story.node.place or None})
 
-    def _action(self, row: Row) -> dict[str, object]:
+    def _failure(self, failure: Failure) -> dict[str, object]:
+        action = failure.action
+        latest = failure.attempts[-1] if failure.attempts else None
         return {
-            "id": self._id(row.behaviour),
-            "name": row.path[-1],
-            "path": list(row.path),
-            "server": row.server,
-            "attempts": row.attempts,
-            "outcome": row.outcome,
-            "end": row.end,
-            "reason": row.reason,
-            "duration": round(row.seconds(self._report.now), 3),
-            "place": row.place or None,
+            "id": failure.node.id,
+            "path": list(failure.path),
+            "attempts": len(failure.attempts),
+            "outcome": latest.outcome if latest is not None else None,
+            "reason": (latest.reason if latest is not None else "") or failure.message,
+            "place": failure.place or None,
+            "server": action.server if action is not None else None,
+            "goal": plain(latest.goal) if latest is not None else None,
+            "result": plain(latest.result) if latest is not None else None,
+            "items": [
+                {"id": loop.id, "round": begun.number, "item": plain(begun.item)}
+                for loop, begun in failure.items
+            ],
         }
 
     def _write(self, data: dict[str, object]) -> None:
         line = as_json(data, ascii_only=not _is_utf8(self._out))
         self._out.write(line + "\n")
         self._out.flush()
+
+
+def action_data(action: ActionStory, now: float) -> dict[str, object]:
+    """Return what became of an action, as it stands at `now` on the steady clock."""
+    return {
+        "id": action.node.id,
+        "name": action.node.name,
+        "path": list(action.path),
+        "server": action.server,
+        "attempts": action.attempts,
+        "visits": action.visits,
+        "outcome": action.outcome,
+        "end": action.end,
+        "reason": action.reason,
+        "duration": round(action.seconds(now), 3),
+        "place": action.node.place or None,
+    }
+
+
+def plain(value: Value | Mapping[str, Value]) -> Any:
+    """Return a snapshot as JSON says it: bytes as numbers, and of what was cut the beginning."""
+    if isinstance(value, Cut):
+        return plain(value.head)
+    if isinstance(value, Mapping):
+        return {name: plain(item) for name, item in value.items()}
+    if isinstance(value, tuple | bytes):
+        return [plain(item) for item in value]
+    return value
+
+
+def _node(node: Node) -> dict[str, object]:
+    return {
+        "id": node.id,
+        "parent": node.parent,
+        "name": node.name,
+        "kind": node.kind,
+        "place": node.place or None,
+    }
 
 
 def _is_utf8(stream: TextIO) -> bool:

@@ -7,18 +7,20 @@ be drawn over.
 
 from __future__ import annotations
 
-from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from bt_actions import render
 from bt_actions.cli.streams.stderr import CaughtStderr
-from bt_actions.cli.views.choosing import branches, choose, fork_of, is_below
-from bt_actions.cli.views.words import Closing, feedback_text, goal_text, last_words
-from bt_actions.events import Event, NodeChanged
-from bt_actions.running.report import Report, Row
+from bt_actions.cli.views.choosing import below, branches, choose, fork_of
+from bt_actions.events import Event, NodeChanged, RoundBegan, RunBegan, StopWanted
+from bt_actions.events.kinds import NodesAdded
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.state import OVER, NodeStory, State
+from bt_actions.story.values import feedback_text
+from bt_actions.story.waiting import due_of
+from bt_actions.story.words import goal_text, last_words, stopping_text
 from bt_actions.utilities.plain_text import clean
 
 _STYLES = {
@@ -58,19 +60,18 @@ def suits(console: Console) -> bool:
 
 
 class LiveView:
-    """Draws from the report; `finish` must be called, or the terminal keeps the drawing."""
+    """Draws from the state; `finish` must be called, or the terminal keeps the drawing."""
 
-    def __init__(self, report: Report, console: Console) -> None:
-        self._report = report
+    def __init__(self, state: State, console: Console) -> None:
+        self._state = state
         self._console = console
         self._plain = not _can_write(console, "✓✗▶·…━")
-        self._nodes: list[Behaviour] = []
-        self._position: dict[object, int] = {}
+        self._nodes: list[int] = []
+        self._position: dict[int, int] = {}
         self._leaves = 0
-        self._index()
-        self._running: set[object] = set()
-        self._done: set[object] = set()
-        self._last: dict[object, Status] = {}
+        self._running: set[int] = set()
+        self._done: set[int] = set()
+        self._last: dict[int, Status] = {}
         self._stopping = False
         self._passing: list[Text] = []
         self._stderr = CaughtStderr()
@@ -89,28 +90,39 @@ class LiveView:
         """What to wait for besides events: standard error's lines."""
         return self._stderr.fileno
 
+    def due(self, now: float) -> None:
+        """Nothing is let by for that it lasts."""
+
     def event(self, event: Event) -> None:
         """Take in one event; let finished work scroll by."""
-        if not isinstance(event, NodeChanged):
-            return
-        node = event.node
-        if node.id not in self._position:
-            self._index()  # a node that was added while the tree runs
-        (self._running.add if event.status is Status.RUNNING else self._running.discard)(node.id)
-        if node.children:
-            return
-        if event.status in (Status.SUCCESS, Status.FAILURE):
-            self._done.add(node.id)
-            if render.action_of(node) or self._last.get(node.id) is not event.status:
-                self._passing.append(self._finished(node, event.status, event.message))
-            self._last[node.id] = event.status
-        else:
-            self._done.discard(node.id)
+        match event:
+            case RunBegan() | NodesAdded():
+                self._index()
+            case NodeChanged():
+                self._node_changed(event)
+            case RoundBegan():
+                for node in below(self._state, event.node):
+                    self._last.pop(node, None)
+            case StopWanted(leaves=False):
+                self.say(stopping_text(self._state))
 
-    def frame(self) -> None:
+    def _node_changed(self, event: NodeChanged) -> None:
+        story, status = self._state.nodes[event.node], event.status
+        (self._running.add if status is Status.RUNNING else self._running.discard)(event.node)
+        if not story.is_leaf:
+            return
+        if status in OVER:
+            self._done.add(event.node)
+            if story.node.server or self._last.get(event.node) is not status:
+                self._passing.append(self._finished(story))
+            self._last[event.node] = status
+        else:
+            self._done.discard(event.node)
+
+    def frame(self, now: float) -> None:
         """Draw."""
         self._let_by()
-        lines = self._lines()
+        lines = self._lines(now)
         self._live.update(Text("\n").join(lines), refresh=True)
 
     def say(self, text: str) -> None:
@@ -118,11 +130,13 @@ class LiveView:
         self._stopping = True
         self._passing.append(Text(text, style="yellow"))
 
-    def finish(self, closing: Closing) -> None:
+    def finish(self) -> None:
         """Take the drawing away; write the table of actions and the summary."""
         self.close()
-        colour = _STYLES[self._report.status] if not closing.cause else "yellow"
-        for line in last_words(self._report, closing, self._console.width):
+        state = self._state
+        caused = state.ended is not None and bool(state.ended.cause)
+        colour = "yellow" if caused else _STYLES[state.status]
+        for line in last_words(state, self._console.width):
             ending = line.startswith(("SUCCESS after", "FAILURE after", "STOPPED after"))
             self._console.print(
                 Text(line, style=f"bold {colour}" if ending else ""), soft_wrap=True
@@ -137,9 +151,9 @@ class LiveView:
         self._let_by()
 
     def _index(self) -> None:
-        self._nodes = [row.node for row in render.rows(self._report.root)]
-        self._position = {node.id: number for number, node in enumerate(self._nodes)}
-        self._leaves = sum(not node.children for node in self._nodes)
+        self._nodes = self._state.in_order()
+        self._position = {node: number for number, node in enumerate(self._nodes)}
+        self._leaves = sum(self._state.nodes[node].is_leaf for node in self._nodes)
 
     def _let_by(self) -> None:
         """Let what has come together scroll by, in one go: each print draws the rest anew."""
@@ -148,31 +162,31 @@ class LiveView:
             lines, self._passing = self._passing, []
             self._console.print(Text("\n").join(lines), soft_wrap=True)
 
-    def _finished(self, node: Behaviour, status: Status, message: str) -> Text:
-        text = Text.assemble((self._glyph(status), _STYLES[status]), " ")
-        text.append(clean(self._report.called(node)))
-        action = render.action_of(node)
-        if action is None:
-            text.append(f"  {clean(message)}" if message else "", style="dim")
+    def _finished(self, story: NodeStory) -> Text:
+        text = Text.assemble((self._glyph(story.status), _STYLES[story.status]), " ")
+        text.append(clean(self._state.called(story.node.id)))
+        if not story.node.server:
+            text.append(f"  {clean(story.message)}" if story.message else "", style="dim")
         else:
-            row = self._report.row(node)
-            text.append(f"  {row.server}  {clean(goal_text(row))}", style="dim")
-            text.append(f"  {row.duration:.2f} s", style="dim")
+            action = self._state.action(story.node.id)
+            text.append(f"  {action.server}  {clean(goal_text(action))}", style="dim")
+            text.append(f"  {action.duration:.2f} s", style="dim")
         return text
 
-    def _lines(self) -> list[Text]:
+    def _lines(self, now: float) -> list[Text]:
         """The progress line, and as many nodes as there is room for."""
         height = self._console.height - 1
         most = max(1, height // 3, height - SCROLLS)
-        lines = [self._progress()]
-        running = self._running_nodes()
-        shown, hidden = choose(self._nodes, self._position, running, max(0, most - 1))
+        lines = [self._progress(now)]
+        running = [node for node in self._running if node in self._position]
+        shown, hidden = choose(self._state, self._nodes, self._position, running, max(0, most - 1))
         marks = self._marks(shown, running)
-        above: list[Behaviour] = []
+        above: list[int] = []
         for node in shown:
-            while above and not is_below(node, above[-1]):
+            holders = {each.node.id for each in self._state.above(node)}
+            while above and above[-1] not in holders:
                 above.pop()
-            lines.append(self._node(node, len(above), marks.get(node.id, "")))
+            lines.append(self._node(now, node, len(above), marks.get(node, "")))
             above.append(node)
         if hidden and most > 1:
             more = f"{self._dots} {hidden} more node{'s' if hidden > 1 else ''}"
@@ -182,11 +196,11 @@ class LiveView:
             self._fit(line, self._width)
         return lines
 
-    def _marks(self, shown: list[Behaviour], running: list[Behaviour]) -> dict[object, str]:
+    def _marks(self, shown: list[int], running: list[int]) -> dict[int, str]:
         """What tells a running node apart where there was no room for what holds it."""
-        there = {node.id for node in shown}
-        forks = fork_of(branches(running, self._position))
-        return {tip: fork.name for tip, fork in forks.items() if fork.id not in there}
+        forks = fork_of(branches(self._state, running, self._position))
+        names = self._state.nodes
+        return {tip: names[fork].node.name for tip, fork in forks.items() if fork not in shown}
 
     @property
     def _width(self) -> int:
@@ -202,48 +216,44 @@ class LiveView:
             text.truncate(max(0, width - len(self._dots)), overflow="crop")
             text.append(self._dots[:width])
 
-    def _running_nodes(self) -> list[Behaviour]:
-        return [self._nodes[self._position[key]] for key in self._running if key in self._position]
-
-    def _node(self, node: Behaviour, depth: int, mark: str) -> Text:
-        status = self._report.status_of(node)
+    def _node(self, now: float, node: int, depth: int, mark: str) -> Text:
+        story = self._state.nodes[node]
+        status = story.status
         narrow = self._width < NARROW
         text = Text((" " if narrow else "  ") * depth)
         text.append(f"{self._glyph(status)} ", style=_STYLES[status])
-        for name in filter(None, (mark, node.name)):
+        for name in filter(None, (mark, story.node.name)):
             said = Text(name, style="dim" if status is Status.INVALID else "")
             self._fit(said, max(12, self._width // (4 if mark else 2)))
             text.append_text(said)
             text.append(": " if name is mark else "")
-        if status is Status.RUNNING and not node.children:
-            row = self._report.row(node) if render.action_of(node) else None
-            told = self._doing(row) if row else self._report.message_of(node)
+        if status is Status.RUNNING and story.is_leaf:
+            told = story.message
+            if self._state.acts(node):
+                told = self._doing(self._state.action(node), now)
             text.append(f"  {clean(told)}" if told else "", style="cyan")
         return text
 
-    def _doing(self, row: Row) -> str:
+    def _doing(self, action: ActionStory, now: float) -> str:
         """What an action is doing: its state, the attempt, its feedback, and the time left."""
-        progress = getattr(row.behaviour, "progress", None)
-        if progress is None:
-            return goal_text(row)
-        now = progress()
-        attempts = f"attempt {now.attempt} of {now.attempts}" if now.attempts > 1 else ""
-        left = "" if now.seconds_left is None else _seconds(now.seconds_left)
-        if now.deadline == "backoff":
-            return ", ".join(
-                part for part in (goal_text(row), f"again in {left}", attempts) if part
-            )
-        state = str(now.state).lower().replace("_", " ")
-        deadline = f"{left} left {_LEFT_FOR.get(now.deadline, '')}".rstrip() if left else ""
-        if self._width < NARROW and left:
+        due = due_of(action, now)
+        attempt, of = action.attempt, action.of
+        left = "" if due is None else _seconds(due.left)
+        if due is not None and due.name == "backoff":
+            again = f"attempt {attempt + 1} of {of}"
+            return ", ".join((goal_text(action), f"again in {left}", again))
+        attempts = f"attempt {attempt} of {of}" if of > 1 else ""
+        state = action.state.lower().replace("_", " ")
+        deadline = f"{left} left {_LEFT_FOR.get(due.name, '')}".rstrip() if due is not None else ""
+        if self._width < NARROW and due is not None:
             state, deadline = "", f"{left} left"
-            attempts = f"{now.attempt} of {now.attempts}" if now.attempt > 1 else ""
-        parts = (state, attempts, deadline, feedback_text(row))
+            attempts = f"{attempt} of {of}" if attempt > 1 else ""
+        parts = (state, attempts, deadline, feedback_text(action))
         return ", ".join(part for part in parts if part)
 
-    def _progress(self) -> Text:
+    def _progress(self, now: float) -> Text:
         done, leaves = len(self._done), max(1, self._leaves)
-        elapsed = f"  {self._report.elapsed():.1f} s"
+        elapsed = f"  {max(0.0, now - self._state.started):.1f} s"
         keys = f"  Ctrl-C {'again leaves' if self._stopping else 'cancels'}"
         counts = (f" {done} of {self._leaves} leaves", f" {done}/{self._leaves}", "")
         count = next(

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
-from bt_actions.cli.views import words
-from bt_actions.events import Event, GoalChanged
+from bt_actions.events import Event, GoalChanged, StopWanted
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.running.report import Report, Row
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.state import State
+from bt_actions.story.values import feedback_text
+from bt_actions.story.words import goal_text, left_open, result_lines, stopping_text
 from bt_actions.utilities.shorten import fit
-
-if TYPE_CHECKING:
-    from bt_actions.behaviours.action import ActionBehaviour
 
 
 class GoalView:
@@ -19,11 +18,8 @@ class GoalView:
 
     fileno = -1
 
-    def __init__(
-        self, report: Report, leaf: ActionBehaviour, out: TextIO, *, feedback: bool
-    ) -> None:
-        self._report = report
-        self._leaf = leaf
+    def __init__(self, state: State, out: TextIO, *, feedback: bool) -> None:
+        self._state = state
         self._out = out
         self._feedback = feedback
         self._last = ""
@@ -31,19 +27,24 @@ class GoalView:
         self._in_place = out.isatty() and feedback
         self._drawn = False
 
+    def due(self, now: float) -> None:
+        """Nothing is written for that it lasts."""
+
     def event(self, event: Event) -> None:
         """Write where the goal stands, when that has changed."""
-        if not isinstance(event, GoalChanged):
+        if isinstance(event, StopWanted) and not event.leaves:
+            self._line(stopping_text(self._state))
+        if not isinstance(event, GoalChanged) or event.outcome is not None:
             return
-        text = words.goal_text(self._report.row(event.behaviour))
-        if event.outcome is None and text != self._last:
+        text = goal_text(self._state.action(event.node))
+        if text != self._last:
             self._last = text
             self._line(text)
 
-    def frame(self) -> None:
+    def frame(self, now: float) -> None:
         """Show the latest feedback."""
-        for row in self._report.live if self._feedback else ():
-            text = self.feedback_text(row)
+        for action in self._state.live if self._feedback else ():
+            text = self.feedback_text(action)
             if text and text != self._last_feedback:
                 self._last_feedback = text
                 self._show_feedback(text)
@@ -52,28 +53,31 @@ class GoalView:
         """Write `text` on a line of its own."""
         self._line(text)
 
-    def finish(self, closing: words.Closing) -> None:
+    def finish(self) -> None:
         """Write the result and the outcome."""
-        for line in self.result_lines():
-            self._line(line)
-        for row in self._report.rows:
-            if self._leaf.history:
-                row.reason = self._leaf.history[-1].goal.reason  # the result was told above
-            if closing.cause and row.outcome is Outcome.CANCELED:
-                row.reason = closing.cause  # here is no tree that could have interrupted it
-            self._line(f"{words.goal_text(row)}, after {row.seconds(self._report.now):.2f} s")
-        for line in words.left_open(self._report, closing):
+        state, ended = self._state, self._state.ended
+        assert ended is not None
+        for action in state.actions:
+            for line in self.result_lines(action):
+                self._line(line)
+        for action in state.actions:
+            if action.latest is not None:
+                action.reason = action.latest.latest.reason  # the result was told above
+            if ended.cause and action.outcome is Outcome.CANCELED:
+                action.reason = ended.cause  # here is no tree that could have interrupted it
+            self._line(f"{goal_text(action)}, after {action.seconds(state.latest):.2f} s")
+        for line in left_open(state):
             self._line(line)
 
-    def feedback_text(self, row: Row) -> str:
+    def feedback_text(self, action: ActionStory) -> str:
         """Return the latest feedback on one line."""
-        return words.feedback_text(row)
+        return feedback_text(action)
 
-    def result_lines(self) -> list[str]:
+    def result_lines(self, action: ActionStory) -> list[str]:
         """Return what the goal's result says."""
-        if self._leaf.end not in (End.SUCCEEDED, End.ABORTED):
+        if action.end not in (End.SUCCEEDED, End.ABORTED):
             return []  # only these have a result of their own
-        return words.result_lines(self._leaf.result)
+        return result_lines(action)
 
     def close(self) -> None:
         """Leave the line that feedback was drawn on."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
 from typing import Any
 
 from bt_actions.cli.exits import Exit
-from bt_actions.cli.views.json_lines import JsonView
+from bt_actions.cli.views.json_lines import JsonView, action_data, plain
 from bt_actions.cli.views.one_goal import GoalView
-from bt_actions.cli.views.table import columns
-from bt_actions.cli.views.words import Closing, brief
-from bt_actions.running.report import Row
+from bt_actions.events import Node, Value
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.table import table
+from bt_actions.story.values import brief, opened
 from bt_actions.utilities.places import told_apart
 from bt_actions.utilities.plain_text import clean
 
@@ -32,85 +33,90 @@ def rejection(goal_name: str) -> tuple[Exit, str]:
 class CallView(GoalView):
     """Which leaves run there, a line a change; at the end what `run` says of a run here."""
 
-    def feedback_text(self, row: Row) -> str:
+    def feedback_text(self, action: ActionStory) -> str:
         """Return the running leaves, deepest first."""
-        message = self._leaf.progress().feedback
-        if message is None:
+        came = action.latest.feedback if action.latest is not None else None
+        if came is None:
             return ""
-        running = ", ".join(_leaf_text(each) for each in message.running)
-        state = "waits for its turn" if message.waiting else "paused" if message.paused else ""
+        message = opened(came.feedback)
+        running = ", ".join(_leaf_text(each) for each in _listed(message.get("running")))
+        waits, paused = message.get("waiting"), message.get("paused")
+        state = "waits for its turn" if waits else "paused" if paused else ""
         return ": ".join(filter(None, [state, running]))
 
-    def result_lines(self) -> list[str]:
+    def result_lines(self, action: ActionStory) -> list[str]:
         """Return the table of the run's actions, its outputs, and why it failed."""
-        result = self._leaf.result
-        if result is None:
+        result = _result(action)
+        if not result:
             return []
-        actions = [_action(each) for each in result.actions]
-        names = told_apart(tuple(each["path"].split(" / ")) for each in actions)
-        body = [
-            (
-                names[tuple(each["path"].split(" / "))],
-                str(each["server"]),
-                str(each["attempts"]),
-                str(each["outcome"]),
-                f"{each['duration']:.2f} s",
-            )
-            for each in actions
-        ]
-        lines = ["", *columns(body)] if body else []
+        actions = _actions(result)
+        names = told_apart(each.path for each in actions)
+        rows = table(actions, lambda each: names[each.path], 0.0)
+        lines = ["", *rows] if rows else []
         outputs = [clean(f"{name}: {brief(value)}") for name, value in _outputs(result).items()]
         lines += ["", *outputs] if outputs else []
-        said = [clean(line) for line in result.error_msg.splitlines()]
+        said = [clean(line) for line in str(result.get("error_msg", "")).splitlines()]
         return [*lines, "", *said] if said else lines
 
 
 class CallJsonView(JsonView):
     """The objects of `run --json`; outputs and actions are those of the run there."""
 
-    rejection: Callable[[], tuple[Exit, str] | None]
-
-    def _finished(self, closing: Closing) -> dict[str, object]:
-        finished = super()._finished(closing)
-        leaf: Any = self._report.root
-        if leaf.result is not None:
-            finished["outputs"] = _outputs(leaf.result)
-            finished["actions"] = [_action(each) for each in leaf.result.actions]
-            finished["error_code"] = leaf.result.error_code
-        if closing.exit_code is Exit.FAILURE and (rejected := self.rejection()):
-            finished["exit_code"], finished["error"] = int(rejected[0]), rejected[1]
+    def _finished(self) -> dict[str, object]:
+        finished = super()._finished()
+        for result in filter(None, map(_result, self._state.actions)):
+            finished["outputs"] = _outputs(result)
+            finished["actions"] = [action_data(each, 0.0) for each in _actions(result)]
+            finished["error_code"] = result.get("error_code")
         return finished
 
 
-def _leaf_text(leaf: Any) -> str:
-    attempt = f" (attempt {leaf.attempt} of {leaf.attempts})" if leaf.attempt > 1 else ""
-    return clean(f"{leaf.path}{attempt}{f': {leaf.message}' if leaf.message else ''}")
+def _result(action: ActionStory) -> dict[str, Value]:
+    return opened(action.latest.result) if action.latest is not None else {}
 
 
-def _outputs(result: Any) -> dict[str, object]:
-    from bt_actions.behaviours.run_tree import roots_of
+def _listed(value: Value) -> list[dict[str, Any]]:
+    """The messages of a list."""
+    return [plain(each) for each in value] if isinstance(value, tuple) else []
 
+
+def _leaf_text(leaf: dict[str, Any]) -> str:
+    attempt = f" (attempt {leaf['attempt']} of {leaf['attempts']})" if leaf["attempt"] > 1 else ""
+    said = f": {leaf['message']}" if leaf["message"] else ""
+    return clean(f"{leaf['path']}{attempt}{said}")
+
+
+def _outputs(result: dict[str, Value]) -> dict[str, object]:
     try:
-        outputs = roots_of(result)["outputs"]
-    except ValueError:
+        outputs = json.loads(str(result.get("outputs") or "{}"))
+    except (ValueError, RecursionError):
         return {}
-    assert isinstance(outputs, dict)
-    return outputs
+    return outputs if isinstance(outputs, dict) else {}
 
 
-def _action(report: Any) -> dict[str, Any]:
-    """An ActionReport as `run --json` has it."""
-    from bt_actions.serving.outcome import ENDS, OUTCOMES
+def _actions(result: dict[str, Value]) -> list[ActionStory]:
+    """The ActionReports of a result as what became of actions here."""
+    from bt_actions.serving.outcome import ENDS, OUTCOMES, SEPARATOR
 
-    outcomes = {number: str(outcome) for outcome, number in OUTCOMES.items()}
-    ends = {number: str(end) for end, number in ENDS.items()}
-    return {
-        "path": clean(report.path),
-        "server": clean(report.server),
-        "attempts": report.attempts,
-        "outcome": outcomes.get(report.outcome),
-        "end": ends.get(report.end),
-        "reason": clean(report.reason),
-        "duration": round(report.duration.sec + report.duration.nanosec / 1e9, 3),
-        "place": clean(report.place) or None,
-    }
+    outcomes = {number: outcome for outcome, number in OUTCOMES.items()}
+    ends = {number: end for end, number in ENDS.items()}
+    found = []
+    for number, report in enumerate(_listed(result.get("actions")), 1):
+        path = tuple(clean(report["path"]).split(SEPARATOR))
+        node = Node(number, None, path[-1], "action", clean(report["place"]))
+        duration = report["duration"]
+        seconds = duration["sec"] + duration["nanosec"] / 1e9
+        found.append(
+            ActionStory(
+                node,
+                path,
+                clean(report["server"]),
+                attempts=report["attempts"],
+                outcome=outcomes.get(report["outcome"]),
+                end=ends.get(report["end"]),
+                reason=clean(report["reason"]),
+                counted=seconds,
+                duration=seconds,
+            )
+        )
+    return found

@@ -1,4 +1,4 @@
-"""What watches a run: told every event after the report has taken it in, on the main thread.
+"""What watches a run: told every event after the state has taken it in, on the main thread.
 
 A view only writes; it decides nothing.
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from bt_actions.cli.views.words import Closing
 from bt_actions.events import Event
 
 
@@ -18,16 +17,19 @@ class View(Protocol):
     def fileno(self) -> int:
         """A file descriptor whose data the view passes on at its next frame, or -1."""
 
+    def due(self, now: float) -> None:
+        """Show what is shown because it has lasted until `now`, on the steady clock."""
+
     def event(self, event: Event) -> None:
         """Show one event."""
 
-    def frame(self) -> None:
-        """Show what changes without an event; called about ten times a second."""
+    def frame(self, now: float) -> None:
+        """Show what changes without an event, `now` on the steady clock; ten times a second."""
 
     def say(self, text: str) -> None:
         """Tell the user something about the run itself."""
 
-    def finish(self, closing: Closing) -> None:
+    def finish(self) -> None:
         """Show how it ended; nothing is shown after it."""
 
     def close(self) -> None:

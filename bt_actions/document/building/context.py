@@ -16,10 +16,11 @@ from functools import lru_cache, partial
 from operator import attrgetter
 from typing import Any
 
-from py_trees.blackboard import Blackboard
+from py_trees.blackboard import Blackboard, KeyMetaData
 
 from bt_actions.behaviours.reading import Formula, Names
 from bt_actions.behaviours.topics import TopicValue
+from bt_actions.behaviours.variables import write
 from bt_actions.document.language.classes import Python
 from bt_actions.document.language.types import parse_type
 from bt_actions.document.language.values import Computed, refuse_large, resolve
@@ -98,12 +99,13 @@ class Scope:
 
     def write(self, name: str, value: object) -> None:
         """Give a variable a value."""
-        Blackboard.set(self.key(name), value)
+        self.write_all({name: value})
 
     def write_all(self, values: Mapping[str, object]) -> None:
         """Give several variables their values."""
-        for name, value in values.items():
-            self.write(name, value)
+        write({self.key(name): value for name, value in values.items()})
+        for name in values:
+            Blackboard.metadata.setdefault(self.key(name), KeyMetaData())
 
     def clear(self, name: str) -> None:
         """Take a variable's value away, if it has one."""

@@ -1,0 +1,58 @@
+"""Feeds the events of a run to its state and its view: the same lines from a run and from a file.
+
+Time passes for the view up to each event, before the event counts: what is shown because something
+lasts is shown as things stood then, however late the event is read.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+from bt_actions.cli.views.view import View
+from bt_actions.events import Event
+from bt_actions.story.state import State
+from bt_actions.story.words import waiting_text
+
+SOON = 1.0
+"""Seconds after the end of the tree for which nothing is said of goals that have not ended."""
+
+
+class Feed:
+    """Holds the state of a run, and the view of it."""
+
+    def __init__(
+        self,
+        state: State,
+        view: View,
+        show: Callable[[Callable[[], None]], None] = lambda draw: draw(),
+    ) -> None:
+        """`show` is given each call of the view, to guard it."""
+        self.state, self.view, self._show = state, view, show
+        self._waits_since: float | None = None
+        """When the tree was first known to have ended; NaN once it is said what is waited for."""
+
+    def event(self, event: Event) -> None:
+        """Take in an event, and show it."""
+        self._pass(event.at.steady)
+        self.state.observe(event)
+        self._show(partial(self.view.event, event))
+
+    def frame(self, now: float) -> None:
+        """Show how things stand at `now`, on the steady clock."""
+        self._pass(now)
+        self._show(partial(self.view.frame, now))
+
+    def _pass(self, now: float) -> None:
+        """Let the time until `now` pass."""
+        self._show(partial(self.view.due, now))
+        state = self.state
+        if not state.decided or state.finished is not None or state.stop is not None:
+            return
+        if self._waits_since is None:
+            since = state.nodes[state.root].since
+            self._waits_since = now if since is None else since.steady
+        if now - self._waits_since >= SOON and (text := waiting_text(state)):
+            self._waits_since = math.nan
+            self._show(lambda: self.view.say(f"{text}; Ctrl-C twice leaves without waiting"))

@@ -1,0 +1,257 @@
+"""What happens in a run, as frozen values of plain data: nothing here refers to a live object.
+
+Every event begins with its `Moment`. A node of the tree is named by its number in `RunBegan`.
+Values of goals, results, feedback and variables are snapshots (snapshot.py); wire.py has their
+exact form as JSON. docs/events.md tells when each kind comes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple, TypeAlias
+
+from py_trees.common import Status
+
+from bt_actions.events.snapshot import Value
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.goals.unaccounted import GoalReport
+
+
+class Moment(NamedTuple):
+    """When something happened, and its place in the order of all events of a runner."""
+
+    number: int
+    """From 1, without a gap; by number the steady clock never goes back."""
+    steady: float
+    """Seconds on the steady clock."""
+    wall: float
+    """Seconds since 1970 on the computer's clock."""
+    ros: float
+    """Seconds on the ROS clock of the run's node."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One node of a tree, as it was when the run began or the node was inserted."""
+
+    id: int
+    """From 1, parents first."""
+    parent: int | None
+    name: str
+    kind: str
+    """In the words of the YAML language where it has one, else the name of the class."""
+    place: str = ""
+    """``file:line:column`` in a tree file; "" for a node made in Python."""
+    server: str = ""
+    """The fully qualified name of the action; "" for a node that is no action."""
+    action: str = ""
+    """The short name of the action's type."""
+    settings: Mapping[str, Value] = field(default_factory=dict)
+    """The policies of the node: `timeouts` in seconds by phase, `attempts`, `expect`, `memory`,
+    `constants` by message (``{"feedback": {"status": {"2": "MOVING"}}}``)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What all kinds have in common."""
+
+    at: Moment
+
+
+@dataclass(frozen=True, slots=True)
+class RunBegan(Event):
+    """A tree is set up, and about to be ticked; or its setup failed. The first event of a run."""
+
+    run_id: str
+    """32 hexadecimal digits."""
+    tree: str
+    nodes: tuple[Node, ...]
+    inputs: Mapping[str, Value]
+    sources: Mapping[str, str]
+    """The tree files by path, as they were read."""
+    versions: Mapping[str, str]
+    """Of bt_actions, py_trees and Python."""
+    request: str = ""
+    """The UUID of the RunTree goal that the run answers, in hexadecimal; or ""."""
+    caller: str = ""
+    """The `run_id` of the run whose leaf sent that goal, where it is known."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodesAdded(Event):
+    """Nodes were inserted into the tree while it runs."""
+
+    nodes: tuple[Node, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NodeChanged(Event):
+    """A node has another status, or has ended again: each visit is told, its RUNNING ticks once."""
+
+    node: int
+    status: Status
+    message: str
+    by_itself: bool = False
+    """Of a FAILURE: no failure below the node has caused it."""
+    warning: str = ""
+    """Of a SUCCESS: why that may not be what was meant."""
+
+
+@dataclass(frozen=True, slots=True)
+class GoalChanged(Event):
+    """A goal has a new state, outcome or end; also after its leaf has left it."""
+
+    node: int
+    goal_id: str
+    """The UUID in hexadecimal."""
+    attempt: int
+    state: str
+    outcome: Outcome | None
+    end: End | None
+    reason: str
+    server: str
+    goal: Value = None
+    """The goal message; with the state SENDING alone."""
+    result: Value = None
+    """The result message; told once."""
+
+
+@dataclass(frozen=True, slots=True)
+class AttemptEnded(Event):
+    """A leaf has judged one attempt: `expect` may want more than the server did."""
+
+    node: int
+    goal_id: str
+    attempt: int
+    outcome: Outcome
+    reason: str
+    expect: str = ""
+    """The condition that the result does not meet, as it was written; or ""."""
+    seen: Mapping[str, Value] = field(default_factory=dict)
+    """What stood for each name and field in that condition: ``{"result.stalled": False}``."""
+    again_in: float | None = None
+    """Seconds until the next attempt; None where there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackCame(Event):
+    """Feedback of a goal: at most five a second of each, and always the last before its end."""
+
+    node: int
+    goal_id: str
+    feedback: Value
+
+
+@dataclass(frozen=True, slots=True)
+class VariableWritten(Event):
+    """A variable has another value: at most five a second, the last before a failure always."""
+
+    name: str
+    """As the tree has it; behind the name and number of the subtree that has it (``recover_1/x``).
+    Of a variable of the user's own, the blackboard's key."""
+    value: Value
+    node: int | None
+    """Who wrote it, where that is known."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoundBegan(Event):
+    """A loop (`for_each`, `repeat`, `retry`) begins its child anew."""
+
+    node: int
+    number: int
+    """From 0."""
+    of: int | None
+    """How many there are at most; None without a limit."""
+    item: Value = None
+    """The item of a `for_each`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServerSeen(Event):
+    """An action server has come in sight of the run, or has gone out of it."""
+
+    server: str
+    in_sight: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Logged(Event):
+    """A `log:` node of the tree says something."""
+
+    node: int
+    level: str
+    """debug, info, warn, error or fatal."""
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ClockJumped(Event):
+    """The wall clock was set, or the ROS clock went back."""
+
+    clock: str
+    """wall or ros."""
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Paused(Event):
+    """No new goal is begun from now on (`paused`), or the run goes on."""
+
+    paused: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StopWanted(Event):
+    """Somebody asks the run to end: its goals are canceled and drained."""
+
+    who: str
+    """A signal, ``--timeout``, ``client``, ``halt``, ``interrupt()`` and the like."""
+    why: str
+    """In words, to follow the status: ``interrupted by SIGINT``."""
+    leaves: bool = False
+    """Whether goals that are being drained are waited for no longer."""
+
+
+@dataclass(frozen=True, slots=True)
+class TreeFinished(Event):
+    """The tree has a status of its own, or was stopped (INVALID); its goals are drained."""
+
+    status: Status
+    outputs: Mapping[str, Value] = field(default_factory=dict)
+    """Of a success, whole: they are data for the caller."""
+    error: str = ""
+    """What a behaviour raised, with its place; or ""."""
+    unusable: bool = False
+    """Whether the tree cannot be set up as it is given, whatever the world does."""
+    unaccounted: tuple[GoalReport, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RunEnded(Event):
+    """The run is over for its caller: the last event."""
+
+    exit_code: int
+    cause: str = ""
+    """Why it did not end by itself, or ""."""
+    error: str = ""
+    """Why the caller's wish could not be met at all, or ""."""
+    unaccounted: tuple[str, ...] = ()
+    """A line for each goal whose end is not known; also of those that were left."""
+    world: str = ""
+    """What the simulated world looks like, or ""."""
+    complaint: str = ""
+    """What is not as it was expected of that world, or ""."""
+
+
+@dataclass(frozen=True, slots=True)
+class EventsLost(Event):
+    """The reader was too slow: so many events were left out before this one."""
+
+    count: int
+
+
+Observer: TypeAlias = Callable[[Event], None]
+"""Called on the ticking thread with each event, in their order; one that raises is removed, and the
+run goes on."""

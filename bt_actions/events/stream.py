@@ -1,0 +1,121 @@
+"""The events of one runner in one order, and those who read them.
+
+An event gets number and moment together, under the stream's lock, on the thread on which it
+happens: the receiving thread for what a server says, the ticking thread for a node whose tick
+returns. Each reader has a queue of its own, so none waits for another, and no producer waits for
+any. Where nobody reads, nothing is made.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from bt_actions.events.kinds import (
+    ClockJumped,
+    Event,
+    EventsLost,
+    FeedbackCame,
+    Logged,
+    Moment,
+    NodeChanged,
+    RoundBegan,
+    VariableWritten,
+)
+
+ROOM = 20_000
+"""Events that wait for one reader, before what can be spared is left out for it."""
+SPARED = (FeedbackCame, VariableWritten, NodeChanged, RoundBegan, Logged)
+"""Kinds that are left out for a slow reader; goals and the run itself never are."""
+JUMP = 0.5
+"""Seconds by which a clock has to differ from the steady one at once to have jumped."""
+Clock = Callable[[], tuple[float, float, float]]
+"""The steady, the wall and the ROS clock, in seconds."""
+
+
+class Reader:
+    """The events for one reader, from `Stream.reader` on; any thread may take them."""
+
+    def __init__(self, poke: Callable[[], None], room: int) -> None:
+        self._events: deque[Event] = deque()
+        self._poke, self._room = poke, room
+        self._lost = 0
+
+    def take(self) -> list[Event]:
+        """Return what has come since the last call, in order; EventsLost for what was left out."""
+        events = []
+        while self._events:
+            events.append(self._events.popleft())
+        return events
+
+    def put(self, event: Event) -> None:
+        """Add an event; for the stream alone, under its lock."""
+        if len(self._events) >= self._room and isinstance(event, SPARED):
+            self._lost += 1
+            return
+        new = [EventsLost(event.at, self._lost), event] if self._lost else [event]
+        self._lost = 0
+        self._events.extend(new)
+        if len(self._events) <= len(new):  # looked at last: the reader takes without the lock
+            self._poke()
+
+
+class Stream:
+    """Takes events from any thread."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._readers: tuple[Reader, ...] = ()
+        self._number = 0
+        self._last: tuple[float, float, float] | None = None
+
+    @property
+    def is_read(self) -> bool:
+        """Whether anybody reads: else nothing has to be added."""
+        return bool(self._readers)
+
+    def reader(self, poke: Callable[[], None] = lambda: None, room: int = ROOM) -> Reader:
+        """Return a reader of all events from now on.
+
+        `poke` is called, on the thread of an event and under the lock, where one comes to an empty
+        queue; it must not wait.
+        """
+        reader = Reader(poke, room)
+        with self._lock:
+            self._readers = (*self._readers, reader)
+        return reader
+
+    def leave(self, reader: Reader) -> None:
+        """Let go of a reader."""
+        with self._lock:
+            self._readers = tuple(each for each in self._readers if each is not reader)
+
+    def add(self, kind: Callable[..., Event], *args: Any, **fields: Any) -> None:
+        """Make an event of `kind` of what follows its moment, and give it to all readers."""
+        if not self._readers:
+            return
+        with self._lock:
+            now = self._clock()
+            for jump in self._jumps(now):
+                self._give(ClockJumped(self._moment(now), *jump))
+            self._give(kind(self._moment(now), *args, **fields))
+
+    def _moment(self, now: tuple[float, float, float]) -> Moment:
+        self._number += 1
+        return Moment(self._number, *now)
+
+    def _give(self, event: Event) -> None:
+        for reader in self._readers:
+            reader.put(event)
+
+    def _jumps(self, now: tuple[float, float, float]) -> list[tuple[str, float]]:
+        """Which clocks have jumped since the last event, and by how much."""
+        last, self._last = self._last, now
+        if last is None:
+            return []
+        steady, wall, ros = (each - before for each, before in zip(now, last, strict=True))
+        jumps = [("wall", wall - steady)] if abs(wall - steady) > JUMP else []
+        return [*jumps, ("ros", ros)] if ros < 0.0 else jumps

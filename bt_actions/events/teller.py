@@ -1,0 +1,101 @@
+"""Tells the stream of one runner what its nodes do: who they are by number, what they write.
+
+`here` is the teller of the run that ticks on this thread. A node of the tree asks for it, tells,
+and needs to know nothing of runs or readers.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from contextvars import ContextVar
+from typing import Any, Protocol
+
+from bt_actions.events.kinds import Event, VariableWritten
+from bt_actions.events.snapshot import Value, snapshot
+from bt_actions.events.stream import Stream
+
+_OF_LOAD = re.compile(r"^/bt/\w+/\d+/")
+"""What the blackboard's key of a tree's variable begins with, another at each load."""
+OFTEN = 0.2
+"""Seconds between two events of one goal's feedback, and of one variable."""
+
+
+class Named(Protocol):
+    """A node: whatever is hashable by identity."""
+
+    name: str
+
+
+class Teller:
+    """What a runner tells of its tree."""
+
+    def __init__(self, stream: Stream, steady: Callable[[], float]) -> None:
+        """`steady` gives the seconds by which the rates of events are bounded."""
+        self.stream = stream
+        self.numbers: dict[object, int] = {}
+        """The number of each node, which all threads may look up."""
+        self._steady = steady
+        self._written: dict[str, Value] = {}
+        """Since a node was last known to have written."""
+        self._waiting: dict[str, tuple[Value, int | None]] = {}
+        """Values that came too soon after the one before."""
+        self._told: dict[str, tuple[float, Value]] = {}
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody reads what is told."""
+        return self.stream.is_read
+
+    def tell(self, kind: Callable[..., Event], node: object, *args: Any, **fields: Any) -> None:
+        """Tell an event of a node, if that is one of the tree."""
+        number = self.numbers.get(node)
+        if number is not None:
+            self.stream.add(kind, number, *args, **fields)
+
+    # Variables; on the ticking thread
+
+    def wrote(self, key: str, value: object) -> None:
+        """Take note of what a variable holds from now on; `claim` says who wrote it."""
+        if self.stream.is_read:
+            self._written[_OF_LOAD.sub("", key)] = snapshot(value)
+
+    def claim(self, node: object) -> None:
+        """What was written since the last claim, `node` has written."""
+        if not self._written and not self._waiting:
+            return
+        number = self.numbers.get(node)
+        self._waiting |= {key: (value, number) for key, value in self._written.items()}
+        self._written.clear()
+        now = self._steady()
+        for key in list(self._waiting):
+            if now - self._told.get(key, (-OFTEN, None))[0] >= OFTEN:
+                self._tell_of(key, now)
+
+    def all_written(self) -> None:
+        """Tell what waits for its time: something fails, or the run ends."""
+        for key in list(self._waiting):
+            self._tell_of(key, self._steady())
+
+    def _tell_of(self, key: str, now: float) -> None:
+        value, node = self._waiting.pop(key)
+        if key in self._told and _same(self._told[key][1], value):
+            return
+        self._told[key] = now, value
+        self.stream.add(VariableWritten, key, value, node)
+
+    def forget(self) -> None:
+        """Begin anew: nodes get numbers again, and every variable is told."""
+        self.numbers = {}
+        self._written.clear()
+        self._waiting.clear()
+        self._told.clear()
+
+
+def _same(one: Value, other: Value) -> bool:
+    return type(one) is type(other) and (one == other or (one != one and other != other))
+
+
+here: ContextVar[Teller | None] = ContextVar("here", default=None)
+"""The teller of the run that sets up, or ticks, a tree on this thread; None in a loop of the
+user's."""

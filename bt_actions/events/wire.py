@@ -1,0 +1,164 @@
+"""Events as JSON and back, exactly: an event that was read equals the one that was written.
+
+What JSON cannot say stands in an object with one key that begins with a dollar sign: ``{"$float":
+"nan"}``, ``{"$int": "9223372036854775807"}`` beyond what a float holds, ``{"$bytes": "..."}`` in
+base64, ``{"$cut": [head, more]}``, and ``{"$map": [[key, value], ...]}`` for a dictionary with such
+a key of its own.
+"""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import enum
+import json
+import math
+import types
+import typing
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import Any
+
+from bt_actions.events import kinds
+from bt_actions.events.kinds import Event
+from bt_actions.events.snapshot import Cut
+
+_EXACT = 2**53
+"""Up to which every reader of JSON has whole numbers exactly."""
+KINDS: dict[str, type[Event]] = {
+    name: kind
+    for name, kind in vars(kinds).items()
+    if isinstance(kind, type) and issubclass(kind, Event) and kind is not Event
+}
+"""The kinds of events by name."""
+
+
+class WireError(ValueError):
+    """A line is no event."""
+
+
+def to_line(event: Event) -> str:
+    """Return an event as one line of ASCII without its end."""
+    return json.dumps(to_plain(event), separators=(",", ":"), allow_nan=False)
+
+
+def from_line(line: str | bytes) -> Event:
+    """Return the event of a line; raises WireError."""
+    try:
+        return from_plain(json.loads(line))
+    except (ValueError, RecursionError) as error:
+        raise WireError(f"no event: {error}") from error
+
+
+def to_plain(event: Event) -> dict[str, Any]:
+    """Return an event as data that JSON can say; `kind` is its name."""
+    fields = {each.name: _packed(getattr(event, each.name)) for each in dataclasses.fields(event)}
+    return {"kind": type(event).__name__, **fields}
+
+
+def from_plain(data: object) -> Event:
+    """Return the event of such data; raises WireError."""
+    try:
+        given = dict(data)  # type: ignore[call-overload]
+        kind = KINDS[given.pop("kind")]
+        readers: dict[str, Reader] = _readers(kind)  # type: ignore[arg-type]  # a class is hashable
+        return kind(**{name: readers[name](value) for name, value in given.items()})
+    except (
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        OverflowError,
+        RecursionError,
+    ) as error:
+        raise WireError(f"no event: {type(error).__name__} {error}") from error
+
+
+def _packed(value: Any) -> Any:
+    if isinstance(value, enum.Enum):
+        return value.value
+    if value is None or isinstance(value, str | bool):
+        return value
+    if isinstance(value, int):
+        return value if -_EXACT <= value <= _EXACT else {"$int": str(value)}
+    if isinstance(value, float):
+        return value if math.isfinite(value) else {"$float": str(value)}
+    if isinstance(value, bytes):
+        return {"$bytes": base64.b64encode(value).decode()}
+    if isinstance(value, Cut):
+        return {"$cut": [_packed(value.head), value.more]}
+    if dataclasses.is_dataclass(value):
+        return {each.name: _packed(getattr(value, each.name)) for each in dataclasses.fields(value)}
+    if isinstance(value, tuple):
+        return [_packed(item) for item in value]
+    if any(name.startswith("$") for name in value):
+        return {"$map": [[name, _packed(item)] for name, item in value.items()]}
+    return {name: _packed(item) for name, item in value.items()}
+
+
+def _value(data: Any) -> Any:
+    """The snapshot that was packed."""
+    if isinstance(data, list):
+        return tuple(_value(item) for item in data)
+    if not isinstance(data, dict):
+        return data
+    if len(data) == 1:
+        ((tag, held),) = data.items()
+        match tag:
+            case "$float":
+                return float(held)
+            case "$int":
+                return int(held)
+            case "$bytes":
+                return base64.b64decode(held, validate=True)
+            case "$cut":
+                return Cut(_value(held[0]), int(held[1]))
+            case "$map":
+                return {str(name): _value(item) for name, item in held}
+    return {name: _value(item) for name, item in data.items()}
+
+
+Reader = Callable[[Any], Any]
+
+
+@lru_cache(maxsize=64)
+def _readers(kind: Any) -> dict[str, Reader]:
+    """How each field of a kind is read."""
+    return {name: _reader(hint) for name, hint in typing.get_type_hints(kind).items()}
+
+
+def _reader(hint: Any) -> Reader:
+    origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType) and type(None) in inner and len(inner) == 2:
+        read = _reader(next(each for each in inner if each is not type(None)))
+        return lambda data: None if data is None else read(data)
+    if isinstance(hint, type) and issubclass(hint, enum.Enum):
+        return hint
+    if isinstance(hint, type) and issubclass(hint, tuple) and hasattr(hint, "_fields"):
+        readers = [_reader(each) for each in typing.get_type_hints(hint).values()]
+        return lambda data: hint(*(read(each) for read, each in zip(readers, data, strict=True)))
+    if isinstance(hint, type) and dataclasses.is_dataclass(hint):
+        fields = _readers(hint)
+        return lambda data: hint(**{name: fields[name](each) for name, each in data.items()})
+    if origin is tuple and len(inner) == 2 and inner[1] is Ellipsis:
+        read = _reader(inner[0])
+        return lambda data: tuple(read(each) for each in data)
+    if origin is Mapping:
+        return lambda data: _mapping(data, inner[1])
+    if hint in (bool, int, float, str):
+        return lambda data: _plain(data, hint)
+    return _value
+
+
+def _plain(data: Any, wanted: type) -> Any:
+    value = _value(data)
+    if type(value) is not wanted:
+        raise WireError(f"{wanted.__name__} is needed, not {type(value).__name__}")
+    return value
+
+
+def _mapping(data: Any, of: Any) -> dict[str, Any]:
+    found: dict[str, Any] = _plain(data, dict)
+    if of is str and not all(isinstance(each, str) for each in found.values()):
+        raise WireError("texts are needed")
+    return found

@@ -1,0 +1,226 @@
+"""Tells the events of a tree's runs: who its nodes are, what becomes of them, how it ends. No ROS.
+
+Nodes are described as values, for readers who have no tree.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import platform
+import sys
+import traceback
+from collections.abc import Iterator
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.trees import BehaviourTree
+
+from bt_actions import document
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.kinds import action_of, kind
+from bt_actions.behaviours.variables import overhear, overhear_less
+from bt_actions.events import (
+    Node,
+    NodeChanged,
+    NodesAdded,
+    RunBegan,
+    TreeFinished,
+    Value,
+)
+from bt_actions.events.snapshot import snapshot
+from bt_actions.events.stream import Stream
+from bt_actions.events.teller import Teller
+from bt_actions.goals.unaccounted import GoalReport
+from bt_actions.messages.fields import constants
+from bt_actions.traffic.backend import Backend
+
+PHASES = ("queue", "server", "accept", "result", "feedback", "cancel")
+
+
+_ALL = sys.maxsize
+
+
+class TreeError(Exception):
+    """A behaviour raised or had no status, or the spin thread died; the goals have been drained."""
+
+
+class UnusableTree(TreeError):
+    """The tree cannot be set up as it is given, whatever the world does."""
+
+
+class TreeTeller(Teller):
+    """Tells what becomes of one tree, in one run after another."""
+
+    def __init__(self, tree: BehaviourTree, backend: Backend) -> None:
+        self._tree, self._backend = tree, backend
+        self._host = backend.traffic.host
+        self._run_id = ""
+        self._has_begun = self._overhears = False
+        """Whether this run was told of, and what clients of the blackboard write is."""
+        self._ros = 0.0
+        self.asked_by = "", ""
+        """The id of the RunTree goal that the runs answer, and that of its caller's run."""
+        super().__init__(Stream(self._moment), self._host.steady)
+
+    def _moment(self) -> tuple[float, float, float]:
+        with contextlib.suppress(Exception):  # the node is destroyed
+            self._ros = self._backend.stamp() * 1e-9
+        return self._host.steady(), self._host.wall(), self._ros
+
+    def begin(self) -> None:
+        """Take note that a run begins, which is told of when its tree is set up."""
+        self._run_id, self._has_begun = self._host.new_goal_id().hex(), False
+        self._overhears = self.is_heard
+        if self._overhears:
+            overhear()
+
+    def rest(self) -> None:
+        """Take note that the run is over."""
+        if self._overhears:
+            self._overhears = False
+            overhear_less()
+
+    def began(self) -> None:
+        """Tell that this run begins, with all its nodes, which get numbers anew."""
+        self._has_begun, root = True, self._tree.root
+        self.forget()
+        if not self.is_heard:
+            return
+        given = document.given_inputs(root)
+        self.stream.add(
+            RunBegan,
+            self._run_id,
+            document.tree_name(root),
+            self._new(),
+            {name: snapshot(value) for name, (_, value) in given.items()},
+            document.sources_of(root),
+            _versions(),
+            *self.asked_by,
+        )
+
+    def added(self) -> None:
+        """Tell of nodes that were inserted since the run began."""
+        if self._has_begun and self.is_heard and (new := self._new()):
+            self.stream.add(NodesAdded, new)
+
+    def _new(self) -> tuple[Node, ...]:
+        """Give the nodes that have none their numbers; return what is told of them."""
+        numbers, found = self.numbers, []
+        for node in _in_order(self._tree.root):
+            if node not in numbers:
+                numbers[node] = len(numbers) + 1
+                parent = None if node.parent is None else numbers.get(node.parent)
+                found.append(describe(node, numbers[node], parent))
+        return tuple(found)
+
+    def changed(self, node: Behaviour) -> None:
+        """Tell the status that a node has now; on the ticking thread, as its tick returns."""
+        if not self.is_heard:
+            return
+        self.claim(node)
+        status, more = node.status, dict[str, object]()
+        if status is Status.FAILURE:
+            self.all_written()
+            more["by_itself"] = bool(getattr(node, "refused", False))
+        elif status is Status.SUCCESS:
+            more["warning"] = str(getattr(node, "warning", ""))
+        self.tell(NodeChanged, node, status, node.feedback_message, **more)
+
+    def finished(
+        self, status: Status, error: BaseException | None, unaccounted: list[GoalReport]
+    ) -> None:
+        """Tell how the tree has ended."""
+        if not self.is_heard:
+            return
+        if not self._has_begun:  # it could not be set up
+            self.began()
+        self.all_written()
+        outputs = document.tree_outputs(self._tree.root) if status is Status.SUCCESS else {}
+        self.stream.add(
+            TreeFinished,
+            status,
+            {name: snapshot(each, fields=_ALL, size=_ALL) for name, each in outputs.items()},
+            "" if error is None else where_raised(error),
+            isinstance(error, UnusableTree),
+            tuple(unaccounted),
+        )
+
+
+def where_raised(error: BaseException) -> str:
+    """Return one line about what ended a run, with the place in the user's code."""
+    cause = error.__cause__ or error
+    frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)
+    return f"{error} ({frames[-1].filename}:{frames[-1].lineno})" if frames else str(error)
+
+
+def _in_order(root: Behaviour) -> Iterator[Behaviour]:
+    """Yield every node below and including `root`, parents first; not bounded by recursion."""
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting.extend(reversed(node.children))
+
+
+def describe(node: Behaviour, number: int, parent: int | None) -> Node:
+    """Return what is told of a node, which has this number."""
+    server, action = action_of(node) or ("", "")
+    return Node(
+        number,
+        parent,
+        node.name,
+        kind(node),
+        str(document.place_of(node) or ""),
+        server,
+        action,
+        _settings(node),
+    )
+
+
+def _settings(node: Behaviour) -> dict[str, Value]:
+    memory = getattr(node, "memory", None)
+    settings: dict[str, Value] = {} if not isinstance(memory, bool) else {"memory": memory}
+    if isinstance(node, ActionBehaviour):
+        settings["timeouts"] = {phase: getattr(node.timeouts, phase) for phase in PHASES}
+        settings["attempts"] = node.retry.attempts
+        if node.expected:
+            settings["expect"] = node.expected
+        if isinstance(node.action_type, type) and (named := _constants(node.action_type)):
+            settings["constants"] = named
+    return settings
+
+
+@lru_cache(maxsize=256)
+def _constants(action: Any) -> dict[str, Value]:
+    """The constants of goal, result and feedback, by field and number."""
+    found: dict[str, Value] = {}
+    parts = {"goal": action.Goal, "result": action.Result, "feedback": action.Feedback}
+    for name, message in parts.items():
+        fields: dict[str, Value] = {}
+        for field in message.get_fields_and_field_types():
+            start = f"{field.upper()}_"
+            named: dict[str, Value] = {
+                str(number): constant.removeprefix(start)
+                for constant, number in reversed(list(constants(message).items()))
+                if constant.startswith(start)
+            }
+            if named:
+                fields[field] = named
+        if fields:
+            found[name] = fields
+    return found
+
+
+@lru_cache(maxsize=1)
+def _versions() -> dict[str, str]:
+    """Return the versions of what runs the tree."""
+    found = {"python": platform.python_version()}
+    for package in ("bt_actions", "py_trees", "rclpy"):
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found

@@ -1,0 +1,388 @@
+"""Where a run stands, folded from its events: nodes, actions, failures, variables, how it ended.
+
+All that is shown or decided of a run reads from here: terminal, `--json`, table, exit code,
+`/rosout`, diagnostics, RunTree's feedback and result, the virtual runner.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from py_trees.common import Status
+
+from bt_actions.events.kinds import (
+    AttemptEnded,
+    Event,
+    EventsLost,
+    FeedbackCame,
+    GoalChanged,
+    Moment,
+    Node,
+    NodeChanged,
+    NodesAdded,
+    Paused,
+    RoundBegan,
+    RunBegan,
+    RunEnded,
+    ServerSeen,
+    StopWanted,
+    TreeFinished,
+    VariableWritten,
+)
+from bt_actions.events.snapshot import Value
+from bt_actions.goals.policy import End
+from bt_actions.goals.unaccounted import GoalReport
+from bt_actions.story.actions import ActionStory, GoalStory
+from bt_actions.utilities.places import told_apart
+
+OVER = (Status.SUCCESS, Status.FAILURE)
+KEPT = 100
+"""Failures that were dealt with and are kept; older ones are counted."""
+
+
+@dataclass(slots=True)
+class NodeStory:
+    """One node of the tree, as it was last told of."""
+
+    node: Node
+    children: list[int] = field(default_factory=list)
+    status: Status = Status.INVALID
+    message: str = ""
+    since: Moment | None = None
+    """When it got its status."""
+    visits: int = 0
+    """How often it has begun."""
+    ended: int = 0
+    """The number of the event with which its visit before the latest ended."""
+    number: int = 0
+    """The number of its latest event."""
+    warning: str = ""
+    round: RoundBegan | None = None
+    """The latest round of a loop."""
+    pending: list[Failure] = field(default_factory=list)
+    """Failures at or below it that nobody above it has dealt with yet."""
+
+    @property
+    def is_leaf(self) -> bool:
+        """Whether it has no children."""
+        return not self.children
+
+
+@dataclass(slots=True)
+class Failure:
+    """One node that failed of itself."""
+
+    node: Node
+    at: Moment
+    path: tuple[str, ...]
+    message: str
+    items: tuple[tuple[Node, RoundBegan], ...] = ()
+    """The rounds of the loops that it failed in, the outermost first."""
+    action: ActionStory | None = None
+    """What the action did; None for a node that is no action."""
+    attempts: tuple[GoalStory, ...] = ()
+    """Of an action: the goals of the visit that failed."""
+    by: Node | None = None
+    """The node that went on in spite of it; None while it is passed on upwards."""
+
+    @property
+    def place(self) -> str:
+        """file:line:column, or ""."""
+        return self.node.place
+
+
+@dataclass(frozen=True, slots=True)
+class Warned:
+    """A leaf that succeeded in something that may not be what was meant."""
+
+    node: Node
+    path: tuple[str, ...]
+    message: str
+
+
+class State:
+    """A run as it stands after the events that it has observed."""
+
+    def __init__(self) -> None:
+        self.began: RunBegan | None = None
+        self.nodes: dict[int, NodeStory] = {}
+        """By number, parents before their children."""
+        self.root = 1
+        self.now: Moment | None = None
+        """Of the latest event."""
+        self.finished: TreeFinished | None = None
+        self.ended: RunEnded | None = None
+        self.stop: StopWanted | None = None
+        """What asked the run to end; the first counts."""
+        self.left = False
+        """Whether goals that are being drained are waited for no longer."""
+        self.paused = False
+        self.lost = 0
+        """Events that this reader was too slow for."""
+        self.variables: dict[str, VariableWritten] = {}
+        self.servers: dict[str, ServerSeen] = {}
+        self.dealt_with: deque[Failure] = deque(maxlen=KEPT)
+        """Failures that somebody went on in spite of, in the order in which that happened."""
+        self.dealt_with_in_all = 0
+        self._actions: dict[int, ActionStory] = {}
+        self._warnings: dict[int, Warned] = {}
+        self._called: dict[int, str] = {}
+
+    # Taking in
+
+    def observe(self, event: Event) -> None:
+        """Take in one event, in the order of their numbers."""
+        self.now = event.at
+        match event:
+            case NodeChanged():
+                self._node_changed(event)
+            case GoalChanged():
+                self.action(event.node).observe(event)
+            case FeedbackCame():
+                if (goal := self.action(event.node).goals.get(event.goal_id)) is not None:
+                    goal.feedback = event
+            case AttemptEnded():
+                self.action(event.node).judge(event)
+            case RoundBegan():
+                self.nodes[event.node].round = event
+            case VariableWritten():
+                self.variables[event.name] = event
+            case ServerSeen():
+                self.servers[event.server] = event
+            case NodesAdded():
+                self._add(event.nodes)
+            case RunBegan():
+                self.__init__()  # type: ignore[misc]
+                self.now, self.began = event.at, event
+                self._add(event.nodes)
+                self.root = event.nodes[0].id
+            case StopWanted():
+                self.stop = self.stop or event
+                self.left |= event.leaves
+            case Paused():
+                self.paused = event.paused
+            case EventsLost():
+                self.lost += event.count
+            case TreeFinished():
+                self.finished = event
+            case RunEnded():
+                self.ended = event
+                for action in self.live if event.unaccounted else ():
+                    action.leave(event.at.steady)
+
+    def _add(self, nodes: tuple[Node, ...]) -> None:
+        for node in nodes:
+            self.nodes[node.id] = NodeStory(node)
+            if node.parent in self.nodes:
+                self.nodes[node.parent].children.append(node.id)
+        self._called.clear()
+
+    def _node_changed(self, event: NodeChanged) -> None:
+        story = self.nodes[event.node]
+        before = story.status
+        if before is not Status.RUNNING:  # another visit
+            story.ended = story.number
+            story.visits += event.status is not Status.INVALID
+            self._deal_with(story.pending, story.node.parent)
+            story.pending = []
+        story.status, story.message, story.number = event.status, event.message, event.at.number
+        story.since, story.warning = event.at, event.warning
+        if event.warning and event.status is Status.SUCCESS:
+            self._warnings[event.node] = Warned(story.node, self.path(event.node), event.warning)
+        if event.status is Status.FAILURE:
+            self._failed(story, event)
+        elif event.status is not Status.RUNNING:
+            for child in story.children:
+                self._settle(child, event.node)
+
+    def _failed(self, story: NodeStory, event: NodeChanged) -> None:
+        passed: list[Failure] = []
+        for child in story.children:
+            below = self.nodes[child]
+            failed = below.status is Status.FAILURE and below.number > story.ended
+            if failed and not event.by_itself:
+                passed += below.pending
+                below.pending = []
+            else:
+                self._settle(child, event.node)
+        story.pending = passed or [self._failure(story, event)]
+
+    def _failure(self, story: NodeStory, event: NodeChanged) -> Failure:
+        action = self._actions.get(event.node)
+        if action is not None:
+            action.failed += 1
+        return Failure(
+            story.node,
+            event.at,
+            self.path(event.node),
+            event.message,
+            tuple(
+                (above.node, above.round)
+                for above in reversed(list(self.above(event.node)))
+                if above.round is not None
+            ),
+            action,
+            tuple(action.tried) if action is not None else (),
+        )
+
+    def _settle(self, child: int, by: int) -> None:
+        """What failed at or below `child` did not make `by` fail."""
+        story = self.nodes[child]
+        if story.pending:
+            self._deal_with(story.pending, by)
+            story.pending = []
+
+    def _deal_with(self, failures: list[Failure], by: int | None) -> None:
+        if by is None or self.nodes[by].node.kind == "invert":  # to which it is no failure
+            return
+        for failure in failures:
+            failure.by = self.nodes[by].node
+            self.dealt_with.append(failure)
+            self.dealt_with_in_all += 1
+
+    # Asking
+
+    def action(self, node: int) -> ActionStory:
+        """Return what an action leaf did, from its first event on."""
+        if node not in self._actions:
+            of = self.nodes[node].node
+            self._actions[node] = ActionStory(of, self.path(node), of.server)
+        return self._actions[node]
+
+    def acts(self, node: int) -> bool:
+        """Whether a node is an action of which something was told."""
+        return node in self._actions
+
+    @property
+    def actions(self) -> list[ActionStory]:
+        """The actions that were tried, in the order of their first goal."""
+        return list(self._actions.values())
+
+    @property
+    def live(self) -> list[ActionStory]:
+        """The actions whose goal may be running now."""
+        return [action for action in self._actions.values() if action.live]
+
+    @property
+    def servers_gone(self) -> list[str]:
+        """The actions with a goal whose server went away; one that only stood still goes on."""
+        return [
+            f"{self.called(action.node.id)} on {action.server}"
+            for action in self._actions.values()
+            if action.left_at_server
+        ]
+
+    @property
+    def status(self) -> Status:
+        """The status that the run has ended with; INVALID before that, and where it was stopped."""
+        return self.finished.status if self.finished is not None else Status.INVALID
+
+    @property
+    def outputs(self) -> Mapping[str, Value]:
+        """What the tree gave its outputs; only once it has succeeded."""
+        return self.finished.outputs if self.finished is not None else {}
+
+    @property
+    def decided(self) -> bool:
+        """Whether the tree has come to its end, be it that goals of it have not."""
+        return self.status_of(self.root) in OVER
+
+    @property
+    def tree(self) -> str:
+        """The tree's name."""
+        return self.began.tree if self.began is not None else ""
+
+    @property
+    def started(self) -> float:
+        """When the run began, in seconds on the steady clock."""
+        if self.began is not None:
+            return self.began.at.steady
+        return self.latest
+
+    @property
+    def latest(self) -> float:
+        """When the latest event happened, in seconds on the steady clock."""
+        return self.now.steady if self.now is not None else 0.0
+
+    @property
+    def elapsed(self) -> float:
+        """The seconds from the run's beginning to the latest event."""
+        return max(0.0, self.latest - self.started)
+
+    def status_of(self, node: int) -> Status:
+        """Return the status that a node was last told with."""
+        story = self.nodes.get(node)
+        return story.status if story is not None else Status.INVALID
+
+    def above(self, node: int) -> Iterator[NodeStory]:
+        """Yield what holds a node, upwards."""
+        parent = self.nodes[node].node.parent
+        while parent is not None and parent in self.nodes:
+            yield self.nodes[parent]
+            parent = self.nodes[parent].node.parent
+
+    def in_order(self) -> list[int]:
+        """Return all nodes, each before its children."""
+        waiting, found = [self.root], list[int]()
+        while waiting:
+            node = waiting.pop()
+            found.append(node)
+            waiting.extend(reversed(self.nodes[node].children))
+        return found
+
+    def path(self, node: int) -> tuple[str, ...]:
+        """Return the names from the root down to a node."""
+        names = [self.nodes[node].node.name, *(above.node.name for above in self.above(node))]
+        return tuple(reversed(names))
+
+    def called(self, node: int) -> str:
+        """Return a leaf's name; where others have it, behind what of its path tells them apart."""
+        if not self._called:
+            paths = {key: self.path(key) for key, each in self.nodes.items() if each.is_leaf}
+            names = told_apart(paths.values())
+            self._called = {key: names[path] for key, path in paths.items()}
+        return self._called.get(node) or self.nodes[node].node.name
+
+    @property
+    def running(self) -> list[NodeStory]:
+        """The leaves that run, deepest first."""
+        leaves = [
+            each
+            for each in self.nodes.values()
+            if each.status is Status.RUNNING
+            and not any(self.nodes[child].status is Status.RUNNING for child in each.children)
+        ]
+        return sorted(leaves, key=lambda each: -sum(1 for _ in self.above(each.node.id)))
+
+    @property
+    def unaccounted(self) -> list[str]:
+        """A line for each goal whose end is not known, now that nothing more is waited for."""
+        last = {key: goal.latest for action in self.actions for key, goal in action.goals.items()}
+        told = self.finished.unaccounted if self.finished is not None else ()
+        goals = {
+            goal.goal_id: goal
+            for goal in told
+            if goal.goal_id not in last or last[goal.goal_id].end in (None, End.UNKNOWN)
+        }
+        for action in self.actions if self.left else ():
+            left = {each.goal_id: each.reason for each in action.given_up}
+            left |= {key: f"{state.lower()} when left" for key, state in action.live.items()}
+            for key, reason in left.items():
+                name = self.called(action.node.id)
+                report = GoalReport(name, action.server, key, action.outcome, reason)
+                goals.setdefault(key, report)
+        return [str(goal) for goal in goals.values()]
+
+    @property
+    def failures(self) -> list[Failure]:
+        """The nodes by whose failure the tree has failed, in tree order."""
+        if self.status is not Status.FAILURE:
+            return []
+        return sorted(self.nodes[self.root].pending, key=lambda each: each.node.id)
+
+    @property
+    def warnings(self) -> list[Warned]:
+        """The leaves that succeeded in something that may not be what was meant, and why."""
+        return list(self._warnings.values())

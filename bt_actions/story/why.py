@@ -1,0 +1,183 @@
+"""Why a run waits, or has failed: the root cause first, with the values that led to it.
+
+One function of the state (and of now, while the run goes on), for every place that tells it: the
+terminal, `--json`, RunTree's result, the diagnostics, a failed assertion over a VirtualRunner.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+from bt_actions.events.kinds import Node, RoundBegan
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.story.actions import ActionStory, GoalStory
+from bt_actions.story.state import Failure, NodeStory, State
+from bt_actions.story.values import brief, feedback_text, opened
+from bt_actions.story.waiting import due_of
+from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import fit, shorten
+
+LINES = 12
+"""Of one story in a terminal."""
+LONG = 80
+"""Characters of one value."""
+ATTEMPTS = 3
+"""Attempts of one failure that have a line of their own: the last ones."""
+BELOW = 5
+"""Lines of a run below a RunTree leaf."""
+_WAITS = {
+    "QUEUED": "waits for its turn on",
+    "WAITING_FOR_SERVER": "waits for the server",
+    "SENDING": "waits for the answer of",
+    "EXECUTING": "waits for the result of",
+    "CANCELING": "waits for the end at",
+}
+
+
+def why(state: State, now: float | None = None) -> list[str]:
+    """Return why the run waits, or why it has failed; nothing of a run that has succeeded.
+
+    `now` is in seconds on the steady clock, and only counts while the run goes on.
+    """
+    if state.finished is None:
+        return waits(state, state.latest if now is None else now)
+    causes = [list(_told(failure, state)) for failure in state.failures]
+    if not causes:
+        return []
+    dealt = list(_dealt_with(state))
+    room = LINES - len(dealt)
+    lines: list[str] = []
+    for number, cause in enumerate(causes):
+        if lines and len(lines) + len(cause) > room:
+            lines.append(f"and {len(causes) - number} more failed")
+            break
+        lines += cause
+    return [fit(line) for line in lines + dealt]
+
+
+def causes(state: State) -> list[str]:
+    """Return why the run has failed, a line for each cause: for who gets one text of it all."""
+    lines = []
+    for failure in state.failures:
+        said = failure.message or "failed"
+        if failure.action is not None and failure.attempts:
+            last = failure.attempts[-1]
+            said = f"{last.outcome}: {last.reason or failure.message}"
+        place = f" ({failure.place})" if failure.place else ""
+        lines.append(f"{' / '.join(failure.path)}: {said}{place}")
+    return lines
+
+
+# While it runs
+
+
+def waits(state: State, now: float) -> list[str]:
+    """Return for each running leaf, the deepest first, what it waits for and until when."""
+    running = state.running
+    lines = [clean(_doing(state, story, now)) for story in running[:LINES]]
+    more = len(running) - LINES
+    return [*lines[:-1], f"and {more + 1} more"] if more > 0 else lines
+
+
+def _doing(state: State, story: NodeStory, now: float) -> str:
+    name = state.called(story.node.id)
+    since = max(0.0, now - story.since.steady) if story.since is not None else 0.0
+    if not state.acts(story.node.id):
+        return f"{name} runs for {since:.1f} s{f': {story.message}' if story.message else ''}"
+    action = state.action(story.node.id)
+    assert action.latest is not None
+    due, since = due_of(action, now), max(0.0, now - action.latest.since.steady)
+    if due is not None and due.name == "backoff":
+        told = f"{action.outcome}: {action.reason}"
+        return f"{name} tries again in {due.left:.1f} s: {told}"
+    what = _WAITS.get(action.state, f"is {action.state.lower()} on")
+    until = f"; timeout.{due.name} at {due.limit:g} s" if due is not None else ""
+    feedback = feedback_text(action)
+    return f"{name} {what} {action.server} for {since:.1f} s{until}" + (
+        f"; feedback: {feedback}" if feedback else ""
+    )
+
+
+# After a failure
+
+
+def _told(failure: Failure, state: State) -> Iterator[str]:
+    """Yield when, where and in which item it failed; each attempt; who passed it on."""
+    items = "".join(f", {_item(*each)}" for each in failure.items)
+    yield clean(f"{_clock(failure.at.wall)}  {' / '.join(failure.path)}{items}")
+    yield from _attempts(failure)
+    passed = ", ".join(
+        f"{above.node.name} ({above.node.kind})" for above in state.above(failure.node.id)
+    )
+    place = failure.place or f"{failure.node.name} ({failure.node.kind})"
+    yield clean(f"  {place}{f'; passed on by {passed}' if passed else ''}")
+
+
+def _attempts(failure: Failure) -> Iterator[str]:
+    goals, action = failure.attempts, failure.action
+    if action is None or not goals:
+        yield clean(f"  failed{f': {failure.message}' if failure.message else ''}")
+        return
+    below = opened(goals[-1].result).get("error_msg") if action.node.action == "RunTree" else ""
+    if isinstance(below, str) and below:
+        yield clean(f"  {goals[-1].outcome}: the run at {action.server} has failed:")
+        yield from (f"    {clean(line)}" for line in below.splitlines()[:BELOW])
+        return
+    if len(goals) > ATTEMPTS:
+        yield f"  {len(goals)} attempts, the last {ATTEMPTS}:"
+    for goal in goals[-ATTEMPTS:]:
+        number = f"attempt {goal.latest.attempt}: " if len(goals) > 1 else ""
+        yield clean(f"  {number}{attempt_text(action, goal)}")
+
+
+def attempt_text(action: ActionStory, goal: GoalStory) -> str:
+    """Say of one attempt what was sent, what came back, and what was made of it."""
+    verdict = goal.verdict
+    if verdict is not None and verdict.expect:
+        seen = ", ".join(
+            f"{name} is {shorten(value, LONG)}" for name, value in verdict.seen.items()
+        )
+        why_not = f"expected {verdict.expect}{f', and {seen}' if seen else ''}"
+    else:  # of an end that is not known the run tells at its end
+        why_not = "" if goal.latest.end is End.UNKNOWN else goal.reason
+    told = f"{goal.outcome}: {why_not}" if why_not else f"{goal.outcome}"
+    sent = shorten(opened(goal.goal), LONG) if goal.goal is not None else ""
+    if sent and "goal {" not in told:
+        told += f"; goal {sent}"
+    if goal.outcome is Outcome.UNEXPECTED_RESULT and goal.result is not None:
+        told += f"; result {shorten(opened(goal.result), LONG)}"
+    elif goal.result is None and goal.feedback is not None:
+        told += f"; last feedback {shorten(opened(goal.feedback.feedback), LONG)}"
+    return told
+
+
+def _dealt_with(state: State) -> Iterator[str]:
+    """Yield the last failures that somebody went on in spite of."""
+    dealt = list(state.dealt_with)[-2:]
+    if not dealt:
+        return
+    count = state.dealt_with_in_all
+    which = "" if count == len(dealt) else f" (the last 2 of {count})"
+    yield f"failed before, and dealt with{which}:"
+    for failure in dealt:
+        items = "".join(f", {_item(*each)}" for each in failure.items)
+        last = failure.attempts[-1] if failure.attempts else None
+        said, tries = failure.message, ""
+        if failure.action is not None and last is not None:
+            said = attempt_text(failure.action, last)
+            tries = f" after {len(failure.attempts)} attempts" if len(failure.attempts) > 1 else ""
+        by = f"; {failure.by.name} ({failure.by.kind}) went on" if failure.by is not None else ""
+        name = state.called(failure.node.id)
+        yield clean(f"  {_clock(failure.at.wall)}  {name}{items}, failed{tries}: {brief(said)}{by}")
+
+
+def _item(loop: Node, begun: RoundBegan) -> str:
+    of = "" if begun.of is None else f" of {begun.of}"
+    if begun.item is None:
+        return f"round {begun.number + 1}{of} of {loop.name}"
+    return f"item {begun.number + 1}{of} of {loop.name} ({shorten(begun.item, LONG)})"
+
+
+def _clock(wall: float) -> str:
+    return time.strftime("%H:%M:%S", time.localtime(wall))

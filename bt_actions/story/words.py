@@ -1,0 +1,187 @@
+"""What the views say in words: where a goal stands, what a message holds, how a run ended.
+
+Pure functions of the state; nothing here writes anything.
+"""
+
+from __future__ import annotations
+
+from py_trees.common import Status
+
+from bt_actions.events.kinds import Moment, RunEnded
+from bt_actions.events.snapshot import Cut, Value
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.state import NodeStory, State
+from bt_actions.story.table import table
+from bt_actions.story.values import brief, constants_of, feedback_text, named
+from bt_actions.story.why import why
+from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import MESSAGE, fit
+from bt_actions.utilities.suggest import listing
+
+_USUAL_ENDS = {
+    Outcome.SUCCEEDED: End.SUCCEEDED,
+    Outcome.UNEXPECTED_RESULT: End.SUCCEEDED,
+    Outcome.ABORTED: End.ABORTED,
+    Outcome.CANCELED: End.CANCELED,
+    Outcome.CANCELED_BY_OTHER: End.CANCELED,
+    Outcome.REJECTED: End.NEVER_STARTED,
+    Outcome.SERVER_UNAVAILABLE: End.NEVER_STARTED,
+    Outcome.SERVER_AMBIGUOUS: End.NEVER_STARTED,
+    Outcome.SERVER_BUSY: End.NEVER_STARTED,
+    Outcome.INVALID_GOAL: End.NEVER_STARTED,
+    Outcome.SERVER_LOST: End.SERVER_GONE,
+}
+"""Ends that go without saying."""
+_NOTHING = RunEnded(Moment(0, 0.0, 0.0, 0.0), 0)
+MOST = 3
+"""Of many actions that are waited for, or many items of a list, how many are shown."""
+MANY = 20
+"""Items of a list that is shown whole."""
+
+
+def last_words(state: State, width: int = MESSAGE) -> list[str]:
+    """Return the table, the verdict, how long it took, and last what went wrong."""
+    ended = state.ended or _NOTHING
+    lines = ["", *action_table(state, width)] if state.actions else []
+    outputs = [clean(f"{name}: {brief(value)}") for name, value in state.outputs.items()]
+    lines += ["", *outputs] if outputs else []
+    lines += ["", ended.world] if ended.world else []
+    word = state.status.value if state.status is not Status.INVALID else "STOPPED"
+    cause = f", {ended.cause}" if ended.cause else ""
+    cause += ", but not as it should be" if ended.complaint and word == "SUCCESS" else ""
+    lines += ["", f"{word} after {state.elapsed:.2f} s{cause}"]
+    wrong = troubles(state)
+    return [*lines, *(["", *wrong] if wrong else [])]
+
+
+def action_table(state: State, width: int = MESSAGE) -> list[str]:
+    """Return the table of the actions of a run."""
+    return table(state.actions, lambda each: state.called(each.node.id), state.latest, width)
+
+
+def troubles(state: State) -> list[str]:
+    """Return what went wrong, the gravest last; empty when nothing did."""
+    warned = [f"{' / '.join(each.path)}: {each.message}" for each in state.warnings]
+    warnings = [fit(f"warning: {clean(line)}") for line in warned]
+    return [*warnings, *why(state), *left_open(state)]
+
+
+def left_open(state: State) -> list[str]:
+    """Return what went wrong beside the tree, and what is not known, the gravest last."""
+    ended = state.ended or _NOTHING
+    lines = [line for line in (ended.complaint, error_text(state)) if line]
+    left = {each.server for each in state.actions if each.left_at_server or each.live}
+    if left and not ended.world:  # of a simulation, which ends with us
+        which = " ".join(["", *sorted(left)]) if len(left) <= MOST else ""
+        lines.append(
+            "A goal may still run, or run on where its server only stood still: once that is in "
+            f"sight, `bt-actions cleanup{which}` cancels it."
+        )
+    lines += [f"not accounted for: {line}" for line in ended.unaccounted]
+    return [fit(clean(line)) for line in lines]
+
+
+def error_text(state: State) -> str:
+    """Say what a behaviour raised, or else what of the run no failure of its tree says."""
+    if state.finished is not None and (state.finished.error or state.failures):
+        return state.finished.error
+    return state.ended.error if state.ended is not None else ""
+
+
+def goal_text(action: ActionStory) -> str:
+    """Say where the latest goal of an action stands."""
+    attempt = f" (attempt {action.attempt})" if action.attempt > 1 else ""
+    if action.outcome is None:
+        words = {
+            "QUEUED": "waiting for its turn on",
+            "WAITING_FOR_SERVER": "waiting for the server",
+            "SENDING": "sending a goal to",
+            "EXECUTING": "executing on",
+            "CANCELING": "canceling on",
+        }
+        return f"{words.get(action.state, action.state.lower())} {action.server}{attempt}"
+    text = f"{action.outcome}{attempt}"
+    if action.end is End.UNKNOWN:  # why, is told of the goal
+        return f"{text}, end not known{' yet' if action.live else ''}"
+    if action.in_doubt:
+        text += ", not started as far as its server knows"
+    elif action.end is not None and action.end is not _USUAL_ENDS.get(action.outcome):
+        text += f", ended {action.end}"
+    return text + (
+        f": {action.reason}" if action.reason and action.outcome is not Outcome.SUCCEEDED else ""
+    )
+
+
+def stopping_text(state: State) -> str:
+    """Say that the run is asked to end, and what is waited for."""
+    assert state.stop is not None
+    again = "Ctrl-C again leaves without waiting"
+    live = len(state.live)
+    if live:
+        goals = "1 goal" if live == 1 else f"{live} goals"
+        return f"{state.stop.why}: canceling {goals}; {again}"
+    waiting = waiting_text(state)
+    return f"{state.stop.why}: {waiting}; {again}" if waiting else state.stop.why
+
+
+def doing_text(story: NodeStory, state: State) -> str:
+    """Say what a running leaf does: of an action its goal's state, the attempt and feedback."""
+    if not state.acts(story.node.id):
+        return story.message
+    action = state.action(story.node.id)
+    tries = f", attempt {action.attempt} of {action.of}" if action.attempt > 1 else ""
+    feedback = feedback_text(action)
+    said = action.state.lower().replace("_", " ")
+    return f"{said}{tries}{f': {feedback}' if feedback else ''}"
+
+
+def waiting_text(state: State) -> str:
+    """Say for what a run waits whose tree has ended; "" where it is over."""
+    actions = [action for action in state.actions if action.waited_for]
+    if actions:
+        goals = sum(action.waited_for for action in actions)
+        count = "1 goal" if goals == 1 else f"{goals} goals"
+        return f"waiting to know the end of {count}: {_where(state, actions)}"
+    actions = [action for action in state.actions if action.left_at_server]
+    if actions:
+        what = "looking out for a server that went away, to cancel its goal if it is back"
+        return f"{what}: {_where(state, actions)}"
+    return ""
+
+
+def _where(state: State, actions: list[ActionStory]) -> str:
+    return listing([f"{state.called(each.node.id)} on {each.server}" for each in actions], MOST)
+
+
+def result_lines(action: ActionStory) -> list[str]:
+    """Return the result of an action as lines of YAML; of long values the beginning."""
+    result = action.latest.result if action.latest is not None else None
+    if result is None:
+        return []
+    import yaml
+
+    constants = constants_of(action, "result")
+    text = yaml.safe_dump(_short(result), sort_keys=False, allow_unicode=True)
+    lines = []
+    for line in text.splitlines():
+        field, _, written = line.partition(": ")
+        name = named(constants, field, int(written)) if written.isdecimal() else written
+        lines.append(f"  {line}" + (f"  # {name}" if name != written else ""))
+    return lines
+
+
+def _short(data: Value) -> object:
+    """Return plain data with the first items of long lists, and the beginning of long texts."""
+    more = data.more if isinstance(data, Cut) else 0
+    data = data.head if isinstance(data, Cut) else data
+    if isinstance(data, dict):
+        short: dict[str, object] = {key: _short(value) for key, value in data.items()}
+        return short | ({"…": f"{more} more"} if more else {})
+    if isinstance(data, bytes):
+        data = tuple(data)
+    if isinstance(data, tuple):
+        size = len(data) + more
+        rest = [f"… {size} items"] if size > MANY else []
+        return [_short(item) for item in (data[:MOST] if rest else data)] + rest
+    return brief(data) if isinstance(data, str) else data

@@ -1,0 +1,279 @@
+"""What a run tells of itself: when, with which values, and of whose variables."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from typing import Any
+
+import py_trees
+import pytest
+from py_trees.behaviour import Behaviour
+from py_trees.blackboard import Blackboard
+from py_trees.common import Access, Status
+from robot_control_interfaces.action import Gripper as GripperAction
+from robot_control_interfaces.action import MoveRobot as Move
+
+from bt_actions import ActionBehaviour, MoveRobot, Retry, Timeouts, load_tree
+from bt_actions.events import (
+    AttemptEnded,
+    Event,
+    FeedbackCame,
+    GoalChanged,
+    NodeChanged,
+    NodesAdded,
+    RoundBegan,
+    RunBegan,
+    ServerSeen,
+    VariableWritten,
+)
+from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
+from tests.support.trees import in_sequence
+
+
+def events_of(runner: VirtualRunner, kind: type[Any]) -> list[Any]:
+    return [event for event in runner.events if isinstance(event, kind)]
+
+
+def tree(text: str, tmp_path: Any, **inputs: object) -> Behaviour:
+    file = tmp_path / "t.yaml"
+    file.write_text(text)
+    return load_tree(file, inputs)
+
+
+class Does(Behaviour):
+    """Does something in each tick of a number, and succeeds in the last."""
+
+    def __init__(self, name: str, do: Callable[[int], None], ticks: int = 1) -> None:
+        super().__init__(name)
+        self._do, self._ticks, self._seen = do, ticks, 0
+
+    def update(self) -> Status:
+        self._seen += 1
+        self._do(self._seen)
+        return Status.SUCCESS if self._seen >= self._ticks else Status.RUNNING
+
+
+class TestGoals:
+    def test_are_told_with_what_was_sent_and_what_came_back(self) -> None:
+        network = VirtualNetwork()
+        ScriptedServer(network, Move, "move_robot", Script(duration=1.0))
+        runner = VirtualRunner(MoveRobot("m", 2.0), network)
+        runner.run()
+        sent = [(e.state, e.goal) for e in events_of(runner, GoalChanged) if e.goal is not None]
+        assert sent == [("SENDING", {"distance": 2.0})]
+        came = [e.result for e in events_of(runner, GoalChanged) if e.result is not None]
+        assert came == [{"final_pose": 0.0, "status": 0, "message": ""}]
+
+    def test_are_told_as_they_were_though_the_message_is_changed_since(self) -> None:
+        network, goal = VirtualNetwork(), Move.Goal(distance=2.0)
+        ScriptedServer(network, Move, "move_robot", Script(duration=1.0))
+
+        def spoil(message: Any) -> None:
+            goal.distance = message.current_pose = 99.0
+
+        leaf = ActionBehaviour("m", Move, "move_robot", goal, on_feedback=spoil)
+        runner = VirtualRunner(leaf, network)
+        runner.run()
+        sent = [e.goal for e in events_of(runner, GoalChanged) if e.goal is not None]
+        assert sent == [{"distance": 2.0}]
+        assert goal.distance == 99.0
+        heard = events_of(runner, FeedbackCame)
+        assert heard
+        assert {e.feedback["current_pose"] for e in heard} == {0.0}
+
+    def test_tell_feedback_at_most_five_times_a_second_and_the_last_before_the_end(self) -> None:
+        network = VirtualNetwork()
+        ScriptedServer(network, Move, "move_robot", Script(duration=3.0))
+        runner = VirtualRunner(MoveRobot("m", 2.0), network)
+        runner.run()
+        times = [e.at.steady for e in events_of(runner, FeedbackCame)]
+        assert 14 <= len(times) <= 17
+        gaps = [after - before for before, after in itertools.pairwise(times[:-1])]
+        assert min(gaps) >= 0.2 - 1e-9
+        (end,) = [e.at for e in events_of(runner, GoalChanged) if e.state == "DONE"]
+        last = events_of(runner, FeedbackCame)[-1]
+        assert last.at.number == end.number - 1
+
+    def test_tell_the_verdict_of_expect_with_what_it_saw(self, tmp_path: Any) -> None:
+        network = VirtualNetwork()
+        ScriptedServer(network, GripperAction, "gripper_control", Script(duration=0.5))
+        root = tree(
+            "tree: t\ninputs: {least: {type: float64, default: 5.0}}\nroot:\n"
+            "  action: Grasp\n  type: robot_control_interfaces/action/Gripper\n"
+            "  server: gripper_control\n  goal: {position: 0.0}\n  timeout: 9 s\n"
+            "  expect: result.stalled and result.position > $least\n"
+            "  retry: {attempts: 2, backoff: 300 ms}\n",
+            tmp_path,
+        )
+        runner = VirtualRunner(root, network)
+        runner.run()
+        first, second = events_of(runner, AttemptEnded)
+        assert (first.attempt, first.outcome) == (1, "UNEXPECTED_RESULT")
+        assert first.again_in == pytest.approx(0.3)
+        assert (second.attempt, second.again_in) == (2, None)
+        assert first.expect == "result.stalled and result.position > $least"
+        assert first.seen == {"result.stalled": False, "result.position": 0.0, "$least": 5.0}
+
+
+def test_a_server_is_told_of_when_it_comes_in_sight_and_when_it_goes() -> None:
+    network = VirtualNetwork()
+    leaf = MoveRobot("m", 2.0, timeout=Timeouts(server=30.0))
+    runner = VirtualRunner(leaf, network)
+    runner.start()
+    runner.advance(2.0)
+    server = ScriptedServer(network, Move, "move_robot", Script(duration=60.0))
+    runner.advance(5.0)
+    server.die()
+    runner.advance(30.0)
+    told = [(e.server, e.in_sight) for e in events_of(runner, ServerSeen)]
+    assert told == [("/move_robot", True), ("/move_robot", False)]
+    assert runner.state.servers["/move_robot"].in_sight is False
+
+
+class TestNodes:
+    def test_are_told_at_each_visit_though_the_status_is_the_same(self, tmp_path: Any) -> None:
+        root = tree(
+            "tree: t\nroot: {for_each: All, in: [7, 8], as: x, child: {check: $x > 0}}\n", tmp_path
+        )
+        runner = VirtualRunner(root)
+        runner.run()
+        check = [e.status for e in events_of(runner, NodeChanged) if e.node == 2]
+        assert check == [Status.SUCCESS, Status.SUCCESS]
+        rounds = [(e.node, e.number, e.of, e.item) for e in events_of(runner, RoundBegan)]
+        assert rounds == [(1, 0, 2, 7), (1, 1, 2, 8)]
+
+    def test_are_told_of_as_they_stop(self) -> None:
+        fails = Does("fails", lambda tick: None, ticks=3)
+        fails.update = lambda: Status.FAILURE  # type: ignore[method-assign]
+        policy = py_trees.common.ParallelPolicy.SuccessOnAll(synchronise=False)
+        runs = py_trees.behaviours.Running("runs")
+        root = py_trees.composites.Parallel("p", policy, children=[runs, fails])
+        runner = VirtualRunner(root)
+        runner.run()
+        told = [(e.node, e.status) for e in events_of(runner, NodeChanged)]
+        assert told == [
+            (2, Status.RUNNING),
+            (3, Status.FAILURE),
+            (1, Status.FAILURE),
+            (2, Status.INVALID),
+        ]
+
+    def test_that_are_inserted_are_told_of_before_they_do_anything(self) -> None:
+        root = in_sequence(name="root")
+
+        def insert(tick: int) -> None:
+            if tick == 1:
+                root.add_child(Does("new", lambda tick: None))
+
+        root.add_child(Does("inserts", insert, ticks=2))
+        runner = VirtualRunner(root)
+        runner.run()
+        (added,) = events_of(runner, NodesAdded)
+        assert [(node.id, node.parent, node.name) for node in added.nodes] == [(3, 1, "new")]
+        assert runner.state.path(3) == ("root", "new")
+        first = next(e for e in runner.events if isinstance(e, NodeChanged) and e.node == 3)
+        assert first.at.number > added.at.number
+
+    def test_of_a_tree_that_cannot_be_set_up_are_told_of_all_the_same(self) -> None:
+        class Broken(Does):
+            def setup(self, **kwargs: Any) -> None:
+                raise OSError("no device")
+
+        runner = VirtualRunner(in_sequence(Broken("b", print), name="root"))
+        with pytest.raises(Exception, match="no device"):
+            runner.run()
+        assert isinstance(runner.events[0], RunBegan)
+        assert "no device" in runner.state.finished.error  # type: ignore[union-attr]
+
+
+class TestVariables:
+    def test_that_the_tree_writes_are_told_with_who_wrote_them(self, tmp_path: Any) -> None:
+        network = VirtualNetwork()
+        ScriptedServer(network, Move, "move_robot", Script(duration=0.5))
+        root = tree(
+            "tree: t\nroot:\n  sequence: S\n  children:\n    - set: {x: 1}\n"
+            "    - action: M\n      type: robot_control_interfaces/action/MoveRobot\n"
+            "      server: move_robot\n      timeout: 9 s\n      goal: {distance: 1.0}\n"
+            "      save: {y: result.final_pose}\n"
+            "    - {for_each: F, in: [3], as: z, child: {success: Z}}\n",
+            tmp_path,
+        )
+        runner = VirtualRunner(root, network)
+        runner.run()
+        names = {number: story.node.name for number, story in runner.state.nodes.items()}
+        told = [(e.name, e.value, names[e.node]) for e in events_of(runner, VariableWritten)]
+        assert told == [("x", 1, "set x"), ("y", 0.0, "M"), ("z", 3, "F")]
+
+    def test_that_a_client_of_the_blackboard_writes_are_told(self) -> None:
+        client = py_trees.blackboard.Client(name="mine")
+        client.register_key("speed", access=Access.WRITE)
+        before = Blackboard.activity_stream
+
+        def write(tick: int) -> None:
+            client.speed = tick
+
+        runner = VirtualRunner(in_sequence(Does("writes", write)))
+        runner.run()
+        told = [(e.name, e.value, e.node) for e in events_of(runner, VariableWritten)]
+        assert told == [("/speed", 1, 2)]
+        assert Blackboard.activity_stream is before
+
+    def test_that_change_often_are_told_five_times_a_second_and_the_last_before_a_failure(
+        self,
+    ) -> None:
+        client = py_trees.blackboard.Client(name="mine")
+        client.register_key("speed", access=Access.WRITE)
+
+        def write(tick: int) -> None:
+            client.speed = tick // 2
+
+        def fail(tick: int) -> None:
+            leaf.update = lambda: Status.FAILURE  # type: ignore[method-assign]
+
+        leaf = Does("writes", lambda tick: write(tick) or (tick == 30 and fail(tick)), ticks=99)
+        runner = VirtualRunner(in_sequence(leaf), heartbeat=0.05)
+        runner.run()
+        told = events_of(runner, VariableWritten)
+        values = [e.value for e in told]
+        assert values[-1] == 15
+        assert values == sorted(set(values))
+        assert len(values) <= 10
+        failed = next(e for e in runner.events if getattr(e, "status", None) is Status.FAILURE)
+        assert told[-1].at.number < failed.at.number
+
+    def test_of_two_runs_are_not_mixed_up(self) -> None:
+        client = py_trees.blackboard.Client(name="mine")
+        for key in ("one", "other"):
+            client.register_key(key, access=Access.WRITE)
+        runners = [
+            VirtualRunner(in_sequence(Does("w", lambda _, key=key: setattr(client, key, 1), 2)))
+            for key in ("one", "other")
+        ]
+        for runner in runners:
+            runner.start()
+        for runner in runners * 3:
+            runner.advance(1.0)
+        told = [{e.name for e in events_of(runner, VariableWritten)} for runner in runners]
+        assert told == [{"/one"}, {"/other"}]
+
+
+def test_an_observer_that_takes_its_time_is_told_of_once() -> None:
+    network = VirtualNetwork()
+    runner = VirtualRunner(in_sequence(Does("d", lambda tick: None, ticks=3)), network)
+
+    def slow(event: Event) -> None:
+        network.timeline.advance(network.timeline.now + 0.06)
+
+    runner.observe(slow)
+    runner.run()
+    said = [line for line in network.log.lines if "observer" in str(line)]
+    assert len(said) == 1
+
+
+def test_retries_tell_their_rounds(tmp_path: Any) -> None:
+    root = tree("tree: t\nroot: {retry: R, attempts: 3, child: {check: 1 > 2}}\n", tmp_path)
+    runner = VirtualRunner(root)
+    runner.run()
+    assert [(e.number, e.of) for e in events_of(runner, RoundBegan)] == [(0, 3), (1, 3), (2, 3)]
+    assert Retry(3).attempts == 3

@@ -1,0 +1,35 @@
+"""What one tick of a tree has changed."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+
+import py_trees
+from py_trees.composites import Sequence
+
+from bt_actions.running.ticking import ChangeVisitor
+
+
+def test_what_was_pruned_in_a_run_is_not_kept() -> None:
+    root = Sequence("root", memory=False)
+    ticking = py_trees.trees.BehaviourTree(root)
+    visitor = ChangeVisitor(lambda: None, lambda: "")
+    ticking.visitors.append(visitor)
+
+    def tick() -> None:
+        ticking.tick()
+        visitor.finish()
+        visitor.forget_others(set(root.iterate()))
+
+    pruned = []
+    for number in range(5):
+        leaf = py_trees.behaviours.Running(f"leaf {number}")
+        ticking.insert_subtree(leaf, root.id, 0)
+        tick()
+        ticking.prune_subtree(leaf.id)
+        tick()
+        pruned.append(weakref.ref(leaf))
+        del leaf
+    gc.collect()
+    assert [each() for each in pruned] == [None] * 5

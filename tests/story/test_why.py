@@ -1,0 +1,115 @@
+"""Why a run waits, or has failed, in lines."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from py_trees.common import Status
+from robot_control_interfaces.action import MoveRobot as Move
+
+from bt_actions import MoveRobot, Timeouts, load_tree
+from bt_actions.goals.policy import End, Outcome
+from bt_actions.story.state import State
+from bt_actions.story.why import why
+from bt_actions.testing import Script, ScriptedServer, Simulation, VirtualNetwork, VirtualRunner
+from tests.support.told_trees import FakeAction, FakeNode, Story
+from tests.support.trees import together
+
+
+@pytest.fixture
+def leaf() -> FakeNode:
+    return FakeAction("Move", place="trees/x.yaml:14:9")
+
+
+@pytest.fixture
+def story(leaf: FakeNode) -> Story:
+    return Story(FakeNode("Deliver", [leaf]))
+
+
+def lines(state: State) -> list[str]:
+    """Why it failed, without times of the day."""
+    return [line.partition("  ")[2] if line[2:3] == ":" else line for line in why(state)]
+
+
+def test_a_failure_names_path_attempts_outcome_reason_and_place(
+    leaf: FakeNode, story: Story
+) -> None:
+    first, second, failed = story.fail(leaf, "a fault")
+    again = {"outcome": Outcome.ABORTED, "end": End.ABORTED, "reason": "another"}
+    state = story.told(
+        first,
+        second,
+        story.goal(leaf, "DONE", attempt=2, **again),
+        failed,
+        story.node(story.root, Status.FAILURE),
+        story.finish(Status.FAILURE),
+    )
+    said = lines(state)
+    assert said[0] == "Deliver / Move"
+    assert any("attempt 1" in line and "ABORTED: a fault" in line for line in said), said
+    assert any("attempt 2" in line and "ABORTED: another" in line for line in said), said
+    assert any("trees/x.yaml:14:9" in line for line in said), said
+
+
+def test_a_failure_tells_the_attempts_of_its_last_visit(leaf: FakeNode, story: Story) -> None:
+    state = story.told(
+        *story.succeed(leaf, 1),
+        *story.fail(leaf, "an older fault", 2),
+        *story.fail(leaf, "a fault", 3),
+        story.node(story.root, Status.FAILURE),
+        story.finish(Status.FAILURE),
+    )
+    said = "\n".join(lines(state)[:3])
+    assert "ABORTED: a fault" in said
+    assert "older" not in said
+    assert "attempt" not in said
+
+
+def test_a_tree_that_succeeded_has_nothing_to_say(leaf: FakeNode, story: Story) -> None:
+    assert why(story.told(*story.succeed(leaf), story.finish(Status.SUCCESS))) == []
+
+
+def test_a_night_of_forty_nodes_is_answered_in_a_few_lines() -> None:
+    """docs/events.md shows it: why did it end, with which goal; what failed before, who went on."""
+    network = VirtualNetwork()
+    Simulation(network, faults=["move_robot:12:abort"])
+    runner = VirtualRunner(load_tree("examples/why.yaml"), network)
+    assert runner.run() is Status.FAILURE
+    assert len(runner.state.nodes) == 40
+    said = why(runner.state)
+    assert len(said) <= 12
+    assert re.match(
+        r"\d\d:\d\d:\d\d  Shift / Go home / Straight home / Home in time / Home$", said[0]
+    )
+    assert said[1].startswith(
+        "  ABORTED: aborted by /move_robot; goal {distance: 0.0}; its result is"
+    )
+    assert re.search(r"examples/why.yaml:\d+:\d+; passed on by Home in time \(timeout\), ", said[2])
+    assert said[3] == "failed before, and dealt with:"
+    second = said[4]
+    for part in (
+        "Grasp, item 2 of 3 of Each station (3.0), failed after 3 attempts: UNEXPECTED_RESULT",
+        "expected result.stalled, and result.stalled is false",
+        "goal {position: 0.0",
+        "result {position: 0.0",
+        "Hold the part (fallback) went on",
+    ):
+        assert part in second, said
+
+
+def test_while_it_runs_each_leaf_says_what_it_waits_for_and_until_when() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, Move, "left", Script(duration=9.0))
+    leaves = [
+        MoveRobot(name, 1.0, action_name=name, timeout=Timeouts(server=5.0, result=8.0))
+        for name in ("left", "right")
+    ]
+    runner = VirtualRunner(together(*leaves), network)
+    runner.start()
+    runner.advance(1.9)
+    feedback = "feedback: current_pose 0.00, status READY"
+    assert why(runner.state, runner.now) == [
+        f"left waits for the result of /left for 1.9 s; timeout.result at 8 s; {feedback}",
+        "right waits for the server /right for 1.9 s; timeout.server at 5 s",
+    ]
