@@ -18,6 +18,7 @@ from bt_actions.document.language.shapes import (
     Key,
     Table,
     report_unknown_key,
+    required_in,
 )
 from bt_actions.document.language.types import interface_of
 from bt_actions.document.language.values import BAD
@@ -37,6 +38,8 @@ from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
 
 _ACTION = KINDS["action"]
 _CHILDREN = ("child", "children")
+_NEEDS = {kind.name: required_in(kind.keys) for kind in KINDS.values()}
+"""The keys that must be there."""
 NODE_KEYS = frozenset(
     {*ACTION_KEYS, *_CHILDREN, *(key for kind in KINDS.values() for key in kind.keys)}
 )
@@ -262,10 +265,8 @@ class _Reader:
             node.name = own
         if unknown:
             return
-        missing = [
-            key for name, key in keys.items()
-            if key.required and name not in written and name not in self._astray
-        ]  # fmt: skip
+        needs = _NEEDS[kind.name] if node.alias is None else ()
+        missing = [key for key in needs if key.name not in written and key.name not in self._astray]
         if missing and node.is_action and node.name in self._actions:
             said = f"{node.name!r} is an action of this tree: its name is the node's kind"
             source.report("BT108", span_of(node.key), said, hint=f"write '{node.name}: name'")
