@@ -133,8 +133,8 @@ class Reading:
             return str(error)
         self._unmet = False
         try:
-            saved = [(name, value(result)) for name, value in self._save.items()]
+            saved = {name: value(result) for name, value in self._save.items()}
         except ValueError as error:  # ExpressionError, or what is saved does not fit
             return str(error)
-        write(dict(saved))
+        write(saved)
         return ""
