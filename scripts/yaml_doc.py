@@ -14,7 +14,6 @@ import textwrap
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from bt_actions.document.findings.pages import PAGES
 from bt_actions.document.findings.rules import RULES
 from bt_actions.document.language.keys import (
     ACTION_KEYS,
@@ -28,8 +27,7 @@ from bt_actions.document.language.keys import (
     TOPIC,
 )
 from bt_actions.document.language.kinds import KINDS, SERVICE_TIMEOUT, Group, Kind
-from bt_actions.document.language.scalars import Text
-from bt_actions.document.language.shape import Shape
+from bt_actions.document.language.scalars import Shape, Text
 from bt_actions.document.language.shapes import Key, Record
 from bt_actions.expressions.functions import ARGUMENTS
 from bt_actions.goals.policy import RETRIED_BY_DEFAULT, RETRIED_IF_NAMED, Busy
@@ -38,7 +36,7 @@ from bt_actions.utilities.units import DURATION_UNITS
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
-PAGES_FILE = "bt_actions/document/findings/pages.py"
+RULES_FILE = "bt_actions/document/findings/rules.py"
 
 FUNCTIONS = {
     "len": "`len($list)` | how many items, characters or keys there are",
@@ -311,16 +309,15 @@ def rules_page() -> str:
     """docs/rules.md."""
     lines = [
         "# The rules of `bt-actions check`", "",
-        f"<!-- Made by scripts/yaml_doc.py from {PAGES_FILE}. Do not edit. -->", "",
+        f"<!-- Made by scripts/yaml_doc.py from {RULES_FILE}. Do not edit. -->", "",
         "| code | | |", "|---|---|---|",
         *(f"| [{rule.code}](#{rule.code.lower()}) | {rule.severity} | {rule.title} |"
           for rule in RULES.values()), "",
     ]  # fmt: skip
-    for code, page in PAGES.items():
-        rule = RULES[code]
-        lines += [f"## {code}", "", f"*{rule.severity}*: {rule.title}", "", page.text, ""]
-        for word, example in (("Wrong", page.wrong), ("Right", page.right)):
-            lines += [f"{word}:", "", f"```{page.language}", example.rstrip("\n"), "```", ""]
+    for code, rule in RULES.items():
+        lines += [f"## {code}", "", f"*{rule.severity}*: {rule.title}", "", rule.text, ""]
+        for word, example in (("Wrong", rule.wrong), ("Right", rule.right)):
+            lines += [f"{word}:", "", f"```{rule.language}", example.rstrip("\n"), "```", ""]
     return "\n".join(lines).rstrip("\n") + "\n"
 
 

@@ -13,7 +13,7 @@ from bt_actions import load_tree
 from bt_actions.cli import main
 from bt_actions.document import DocumentError, open_tree
 from bt_actions.document.building.build import build
-from bt_actions.document.building.scope import Scope
+from bt_actions.document.building.context import Scope
 from bt_actions.document.reading.workspace import Workspace
 from bt_actions.document.yaml.source import MAX_ERRORS
 

@@ -31,7 +31,7 @@ class CallService(Connected[Service], Limited):
         response: seconds to wait for the answer; None waits for ever.
         retry: how often, with `when` as a callable; its outcomes are not looked at, a service knows
             only one failure.
-        read: called with the answer; raising ValueError fails.
+        read: called with the answer; gives what is wrong with it, or an empty text.
     """
 
     _call: Call | None = None
@@ -47,7 +47,7 @@ class CallService(Connected[Service], Limited):
         server: float | None,
         response: float | None,
         retry: Retry,
-        read: Callable[[Any], None],
+        read: Callable[[Any], str],
     ) -> None:
         super().__init__(name)
         self.service_type = service_type
@@ -85,7 +85,8 @@ class CallService(Connected[Service], Limited):
         if call is not None:
             if call.done():
                 self._call, self._response = None, call.result()
-                self._read(self._response)
+                if wrong := self._read(self._response):
+                    raise ValueError(wrong)
                 return Status.SUCCESS
             self.feedback_message = f"waiting for an answer of {client.name}"
             if self.left() <= 0.0:

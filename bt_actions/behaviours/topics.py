@@ -107,7 +107,7 @@ class WaitForMessage(Connected[Subscription], Limited):
         topic: a relative name is expanded with the node's namespace.
         qos: as the tree language calls it.
         timeout: seconds on the node's clock after which it fails; None: never.
-        read: called with each message; raises ValueError for one that is not waited for.
+        read: called with each message; gives why it is not the one waited for, or an empty text.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class WaitForMessage(Connected[Subscription], Limited):
         *,
         qos: str,
         timeout: float | None,
-        read: Callable[[Any], None],
+        read: Callable[[Any], str],
     ) -> None:
         super().__init__(name)
         self._given = message_type, topic, qos
@@ -149,12 +149,8 @@ class WaitForMessage(Connected[Subscription], Limited):
         topic = subscription.name
         self.feedback_message = f"waiting for a message on {topic}"
         for _ in range(len(self._kept)):  # not what comes meanwhile: a tick must end
-            try:
-                self._read(self._kept.popleft())
-            except ValueError as error:  # ExpressionError is one
-                self.feedback_message = str(error)
-            else:
-                self.feedback_message = ""
+            self.feedback_message = self._read(self._kept.popleft())
+            if not self.feedback_message:
                 return Status.SUCCESS
         if self.left() > 0.0:
             return Status.RUNNING

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from bt_actions.document.findings import NODE, Place
 
 if TYPE_CHECKING:
-    from bt_actions.document.findings import DocumentError, Finding, Related, Severity, Span
-    from bt_actions.document.findings.rules import RULES, Rule
+    from bt_actions.document.findings import DocumentError, Finding, Related, Rule, Severity, Span
+    from bt_actions.document.findings.rules import RULES
     from bt_actions.document.load import (
         Tree,
         check_file,

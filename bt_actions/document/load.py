@@ -21,14 +21,14 @@ from bt_actions.document.reading.inputs import TreeInput, check_inputs, inputs_o
 from bt_actions.document.reading.tree import Document
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.reading.workspace import Workspace
-from bt_actions.document.yaml.ignores import apply_ignores
 from bt_actions.document.yaml.source import Source, TooManyErrors
+from bt_actions.document.yaml.written import apply_ignores
 from bt_actions.utilities.plain_data import plain
 
 if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
-    from bt_actions.document.building.scope import Scope
+    from bt_actions.document.building.context import Scope
     from bt_actions.document.language.classes import Python
 
 PathLike = str | os.PathLike[str]
@@ -123,7 +123,7 @@ class Tree:
     @_no_collecting
     def _build(self, inputs: Mapping[str, object], *, once: bool) -> Behaviour:
         from bt_actions.document.building.build import build
-        from bt_actions.document.building.scope import Scope
+        from bt_actions.document.building.context import Scope
 
         document, types = self._document, self._types
         values = check_inputs(document, inputs, types=types)
@@ -267,9 +267,8 @@ def _checked(workspace: Workspace, *, types: bool, python: Python = True) -> lis
         with contextlib.suppress(TooManyErrors):  # which are errors of this document: it is refused
             checker = Checker(document, types=types, python=python)
             check_document(checker)
-            doubts = Doubts(document)  # anew: the checker found more
-            find_hazards(checker, doubts)
-            apply_ignores(document.source, partial(_all_tried, document, doubts))
+            find_hazards(checker)
+            apply_ignores(document.source, partial(_all_tried, document, checker.doubts))
     return workspace.findings
 
 

@@ -76,7 +76,7 @@ def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str,
         found = getattr(node, attribute, None)
         if isinstance(found, type | str) and found:
             return found, kind
-    if written is not None and written.kind is not None:
+    if written is not None:
         name = written.values.get("type")
         if written.kind.name in ("publish", "wait_for_message") and isinstance(name, str):
             return name, "msg"

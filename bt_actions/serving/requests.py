@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from bt_actions.document import DocumentError, source_of
-from bt_actions.document.language.bounds import refuse_large
+from bt_actions.document.language.values import refuse_large
 from bt_actions.document.yaml.compose import compose
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
 from bt_actions.document.yaml.nodes import data_of

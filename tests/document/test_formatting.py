@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bt_actions.document import DocumentError, source_of
-from bt_actions.document.findings.pages import PAGES
-from bt_actions.document.formatting.format import format_source
-from bt_actions.document.formatting.layout import FormatError
+from bt_actions.document.findings.rules import RULES
+from bt_actions.document.formatting.format import FormatError, format_source
 from tests.document.test_wrong_documents import CASES
 
 TREES = Path(__file__).parents[2] / "trees"
@@ -132,9 +131,9 @@ def test_the_sample_trees_are_in_canonical_form(path: Path) -> None:
     assert formatted(path.read_text(encoding="utf-8")) == path.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("code", sorted(code for code in PAGES if PAGES[code].language == "yaml"))
+@pytest.mark.parametrize("code", sorted(code for code in RULES if RULES[code].language == "yaml"))
 def test_formatting_twice_changes_nothing_more(code: str) -> None:
-    once = formatted(PAGES[code].right)
+    once = formatted(RULES[code].right)
     assert formatted(once) == once
 
 

@@ -22,8 +22,7 @@ from std_srvs.srv import SetBool
 from bt_actions.document import DocumentError
 from bt_actions.document.language.keys import NODE, NODES, TOP_KEYS
 from bt_actions.document.language.kinds import KINDS
-from bt_actions.document.language.scalars import Condition, Duration, Place, Text
-from bt_actions.document.language.shape import Shape
+from bt_actions.document.language.scalars import Condition, Duration, Place, Shape, Text
 from bt_actions.document.language.shapes import Key, ListOf, ListValue, OneOf, Record, Table, Values
 from bt_actions.document.language.values import computed_in
 from bt_actions.document.yaml.compose import compose

@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from bt_actions.document import RULES, Severity, check_file
-from bt_actions.document.findings.pages import PAGES, page
+from bt_actions.document.findings import rules
+from bt_actions.document.findings.hazards import HAZARDS
 
 NOT_SHOWN = {"BT100", "BT101"}
 """What is wrong with a file, and not with its text: their examples are commands."""
@@ -23,18 +24,19 @@ def codes(folder: Path, name: str, text: str) -> dict[str, Severity]:
     return {finding.code: finding.severity for finding in check_file(folder / name)}
 
 
-def test_each_rule_has_a_page_and_each_page_a_rule() -> None:
-    assert list(PAGES) == list(RULES)
+def test_each_code_is_that_of_one_rule() -> None:
+    codes = [rule.code for rule in (*rules._RULES, *HAZARDS)]
+    assert codes == sorted(set(RULES))
 
 
-@pytest.mark.parametrize("code", sorted(set(PAGES) - NOT_SHOWN))
+@pytest.mark.parametrize("code", sorted(set(RULES) - NOT_SHOWN))
 def test_the_wrong_example_breaks_the_rule_and_no_other(code: str, tmp_path: Path) -> None:
-    assert set(codes(tmp_path, "wrong.yaml", PAGES[code].wrong)) == {code}
+    assert set(codes(tmp_path, "wrong.yaml", RULES[code].wrong)) == {code}
 
 
-@pytest.mark.parametrize("code", sorted(set(PAGES) - NOT_SHOWN))
+@pytest.mark.parametrize("code", sorted(set(RULES) - NOT_SHOWN))
 def test_the_right_example_is_clean(code: str, tmp_path: Path) -> None:
-    assert codes(tmp_path, "right.yaml", PAGES[code].right) == {}
+    assert codes(tmp_path, "right.yaml", RULES[code].right) == {}
 
 
 @pytest.mark.parametrize("code", sorted(NOT_SHOWN))
@@ -47,13 +49,13 @@ def test_the_commands_of_a_page_show_the_rule(code: str) -> None:
         )
         return done.returncode, done.stdout
 
-    status, said = run(PAGES[code].wrong)
+    status, said = run(RULES[code].wrong)
     assert (status, f"error[{code}]" in said) == (2, True)
-    assert run(PAGES[code].right) == (0, "")
+    assert run(RULES[code].right) == (0, "")
 
 
 def test_a_page_shows_title_text_and_examples() -> None:
-    text = page("BT203")
+    text = RULES["BT203"].page()
     assert text.startswith("BT203: a message has no such field (error)\n")
     assert "    goal: {distnace: 2.0}" in text
     assert "Right:" in text

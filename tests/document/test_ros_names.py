@@ -16,7 +16,7 @@ from robot_control_interfaces.action import MoveRobot
 
 from bt_actions.document.language.ros_names import LONGEST, LONGEST_NAMESPACE, RosName
 from bt_actions.document.language.values import BAD
-from bt_actions.document.reading.settings import join_names
+from bt_actions.document.reading.tree import join_names
 from bt_actions.document.yaml.compose import compose
 from bt_actions.document.yaml.source import Source
 

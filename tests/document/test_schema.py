@@ -12,7 +12,7 @@ import pytest
 
 from bt_actions.cli import main
 from bt_actions.document import check_file
-from bt_actions.document.findings.pages import PAGES
+from bt_actions.document.findings.rules import RULES
 from bt_actions.document.language.keys import ALIAS, INPUT, OUTPUT, TOP_KEYS, TOPIC
 from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.schema import json_schema
@@ -66,15 +66,15 @@ def test_it_takes_the_example_of_each_kind(kind: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "code", sorted(code for code, page in PAGES.items() if page.language == "yaml")
+    "code", sorted(code for code, page in RULES.items() if page.language == "yaml")
 )
 def test_it_takes_the_right_example_of_each_rule(code: str) -> None:
-    assert complaints(PAGES[code].right) == []
+    assert complaints(RULES[code].right) == []
 
 
 @pytest.mark.parametrize("code", sorted(OF_FORM))
 def test_it_refuses_the_wrong_example_of_each_rule_of_form(code: str) -> None:
-    assert complaints(PAGES[code].wrong)
+    assert complaints(RULES[code].wrong)
 
 
 def test_the_line_for_editors_is_the_same_in_docs_and_help(

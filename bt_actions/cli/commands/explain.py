@@ -25,7 +25,6 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the page of a rule, or the list of rules."""
-    from bt_actions.document.findings.pages import page
     from bt_actions.document.findings.rules import RULES
 
     if args.code is None:
@@ -36,5 +35,5 @@ def run(args: argparse.Namespace) -> int:
         near = [rule for rule in RULES if code.startswith(rule) or rule.endswith(code)]
         more = f"did you mean {near[0]!r}?" if len(near) == 1 else "`bt-actions explain` lists them"
         raise BadInput(f"there is no rule {args.code!r}; {more}")
-    write(page(code))
+    write(RULES[code].page())
     return Exit.SUCCESS

@@ -72,8 +72,7 @@ def _format(name: str, *, check: bool) -> bool:
 
 def _formatted(name: str) -> tuple[str, str]:
     from bt_actions.document import DocumentError
-    from bt_actions.document.formatting.format import format_source
-    from bt_actions.document.formatting.layout import FormatError
+    from bt_actions.document.formatting.format import FormatError, format_source
     from bt_actions.document.yaml.source import read_source, read_stream
 
     try:

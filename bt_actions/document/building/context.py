@@ -1,32 +1,119 @@
-"""What a node is built in: its document, its variables, its namespace. Builds nothing itself."""
+"""What a node is built in: its document, its variables, its namespace. Builds nothing itself.
+
+The variables of a loaded tree lie on py_trees' blackboard under a namespace of their own. The
+blackboard is process-global and has no lock: read and write on the ticking thread only.
+"""
 
 from __future__ import annotations
 
 import ast
+import itertools
+import re
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from operator import attrgetter
 from typing import Any
 
+from py_trees.blackboard import Blackboard, KeyMetaData
+
+from bt_actions.behaviours.reading import Formula, Names
 from bt_actions.behaviours.topics import TopicValue
-from bt_actions.document.building.scope import Scope
-from bt_actions.document.language.bounds import refuse_large
+from bt_actions.behaviours.variables import write
 from bt_actions.document.language.classes import Python
 from bt_actions.document.language.types import parse_type
-from bt_actions.document.language.values import Computed, resolve
+from bt_actions.document.language.values import Computed, refuse_large, resolve
 from bt_actions.document.reading.inputs import convert
-from bt_actions.document.reading.settings import join_names, text_of
-from bt_actions.document.reading.tree import Document, TreeNode
+from bt_actions.document.reading.tree import Document, TreeNode, join_names, text_of
 from bt_actions.document.yaml.nodes import Scalar
 from bt_actions.expressions.expression import Expression
 from bt_actions.messages import fields
 
-Root = str | Callable[[Any], Mapping[str, object]] | None
-"""The bare name that an expression has for what it is a function of; or what gives several."""
-
-
 _NUMBERS = {*fields.FLOATS, *fields.INTEGERS} - {"byte"}
+_ODD = re.compile(r"[^A-Za-z0-9_]")
+_LOADS = "/bt/loads"
+"""The blackboard's key of its own `_Loads`: on one that was cleared they begin anew."""
+
+
+class _Loads:
+    """What tells the trees of a blackboard apart, and which of them are gone. Atomic steps only."""
+
+    def __init__(self) -> None:
+        self.numbers = itertools.count(1)
+        self.gone: deque[str] = deque()
+        """Prefixes of which no scope is left; the collector may come in the middle of a tick."""
+
+
+class Scope:
+    """Names of a tree and where their values lie; `topics` are read before the blackboard."""
+
+    def __init__(self, prefix: str) -> None:
+        self.prefix = prefix
+        self._outer: Scope | None = None
+        self._gone: deque[str] | None = None
+        self._children: dict[str, int] = {}
+
+    def __repr__(self) -> str:
+        return f"<Scope {self.prefix}>"
+
+    @classmethod
+    def of_load(cls, tree: str) -> Scope:
+        """The scope of a tree that is loaded now: no other load has the same.
+
+        Its variables are forgotten at a later load, when nothing of the tree is left.
+        """
+        loads = Blackboard.storage.setdefault(_LOADS, _Loads())
+        while True:
+            try:
+                prefix = f"{loads.gone.popleft()}/"
+            except IndexError:
+                break
+            for key in [key for key in list(Blackboard.storage) if key.startswith(prefix)]:
+                Blackboard.unset(key)
+            for key in [key for key in list(Blackboard.metadata) if key.startswith(prefix)]:
+                Blackboard.metadata.pop(key, None)
+        scope = cls(f"/bt/{_safe(tree)}/{next(loads.numbers)}")
+        scope._gone = loads.gone
+        return scope
+
+    def __del__(self) -> None:
+        if self._gone is not None:
+            self._gone.append(self.prefix)
+
+    def inner(self, tree: str) -> Scope:
+        """The scope of a tree included in this one."""
+        name = _safe(tree)
+        number = self._children[name] = self._children.get(name, 0) + 1
+        scope = Scope(f"{self.prefix}/{name}_{number}")
+        scope._outer = self  # which lives as long, and so do the variables
+        return scope
+
+    def key(self, name: str) -> str:
+        """The blackboard key of a variable."""
+        return f"{self.prefix}/{name}"
+
+    def read(self, name: str) -> object:
+        """The value of a variable. Raises KeyError when it has none."""
+        return Blackboard.storage[self.key(name)]
+
+    def write(self, name: str, value: object) -> None:
+        """Give a variable a value."""
+        self.write_all({name: value})
+
+    def write_all(self, values: Mapping[str, object]) -> None:
+        """Give several variables their values."""
+        write({self.key(name): value for name, value in values.items()})
+        for name in values:
+            Blackboard.metadata.setdefault(self.key(name), KeyMetaData())
+
+    def clear(self, name: str) -> None:
+        """Take a variable's value away, if it has one."""
+        Blackboard.unset(self.key(name))
+
+
+def _safe(name: str) -> str:
+    return _ODD.sub("_", name) or "tree"
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,27 +167,27 @@ class Context:
         """A function that computes a value as it stands in the document."""
         return lambda: resolve(written, self.read)
 
-    def condition(self, written: object, root: Root = None) -> Callable[[Any], bool] | None:
-        """A condition over a bare root as a function of it."""
+    def condition(self, written: object, names: Names) -> Formula | None:
+        """A condition over a result as a function of that."""
         if not isinstance(written, Computed):
             return None
-        return Condition(written.expression, root, self.read)
+        return Formula(written.expression, names, self.read)
 
     def saved(
-        self, written: object, root: Root, cls: type | None = None
+        self, written: object, names: Names, cls: type | None = None
     ) -> dict[str, Callable[[Any], object]]:
-        """What `save` keeps, by the variable's name, as functions of a bare root.
+        """What `save` keeps, by the blackboard's key, as functions of a result.
 
         They raise ValueError for what has no value, or does not fit its variable. `cls` is the
-        message that the root is, where that is known.
+        message that the result is, where that is known.
         """
         return {
-            name: Part(
+            self.scope.key(name): Formula(
                 place.expression,
-                root,
-                self,
-                name,
-                _numbers(place.expression, root, cls, self._declared(name)),
+                names,
+                self.read,
+                partial(self.fitting, name),
+                _numbers(place.expression, cls, self._declared(name)),
             )
             for name, place in table_of(written).items()
         }
@@ -117,62 +204,16 @@ class Context:
         return lambda: written.expression.holds({}, self.read)
 
 
-@dataclass(slots=True, eq=False)
-class Condition:
-    """An expression as a function of its bare root; `text` says what was expected."""
-
-    expression: Expression
-    root: Root
-    read: Callable[[str], object]
-
-    @property
-    def text(self) -> str:
-        """The condition as it was written."""
-        return self.expression.text
-
-    def seen(self, given: Any) -> dict[str, object]:
-        """What stood for the names in it."""
-        return self.expression.seen(_roots(self.root, given), self.read)
-
-    def __call__(self, given: Any) -> bool:
-        """Whether it holds; raises ExpressionError."""
-        return self.expression.holds(_roots(self.root, given), self.read)
-
-
-@dataclass(slots=True, eq=False)
-class Part:
-    """What is kept of a result or a message, as a function of it; `text` says what that is."""
-
-    expression: Expression
-    root: Root
-    context: Context
-    name: str
-    get: Callable[[Any], object] | None
-    """What gets a field of numbers that needs no look."""
-
-    @property
-    def text(self) -> str:
-        """The expression as it was written."""
-        return self.expression.text
-
-    def __call__(self, given: Any) -> object:
-        """The value as its variable wants it; raises ValueError."""
-        if self.get is not None:
-            return self.get(given)
-        value = self.expression.evaluate(_roots(self.root, given), self.context.read)
-        return self.context.fitting(self.name, value)
-
-
 @lru_cache(maxsize=1024)
 def _numbers(
-    expression: Expression, root: Root, cls: type | None, declared: str | None
+    expression: Expression, cls: type | None, declared: str | None
 ) -> Callable[[Any], object] | None:
     """What gets a field of numbers that is of its variable's type as it is; None for any other."""
     path, node = list[str](), expression.tree
     while isinstance(node, ast.Attribute):
         path.insert(0, node.attr)
         node = node.value
-    if cls is None or not path or not isinstance(node, ast.Name) or node.id != root:
+    if cls is None or not path or not isinstance(node, ast.Name) or node.id != "result":
         return None
     kind: fields.FieldType | None = fields.Message(cls)
     for part in path:
@@ -185,12 +226,6 @@ def _numbers(
         return None
     fits = declared is None or parse_type(declared) == kind
     return attrgetter(".".join(path)) if fits else None
-
-
-def _roots(root: Root, given: Any) -> Mapping[str, object]:
-    if callable(root):
-        return root(given)
-    return {} if root is None else {root: given}
 
 
 def table_of(value: object) -> dict[str, Any]:

@@ -1,31 +1,200 @@
-"""The checks of names and types, in their order: what the form alone cannot tell."""
+"""The checks of names and types, in their order: what the form alone cannot tell.
+
+Those of single kinds are in `kinds.py`, those of single values in `checker.py`. What is written in
+another file is told there where it is wrong by itself, and at the import where it is wrong in this
+tree only.
+"""
 
 from __future__ import annotations
 
-from bt_actions.document.checking.actions import check_actions, check_defaults, check_use
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
 from bt_actions.document.checking.checker import Checker
-from bt_actions.document.checking.declarations import check_declarations
 from bt_actions.document.checking.kinds import CHECKS
 from bt_actions.document.checking.names import check_names
-from bt_actions.document.reading.tree import TreeNode
+from bt_actions.document.findings import Related
+from bt_actions.document.language.types import TypeNameError, parse_type
+from bt_actions.document.language.values import (
+    BAD,
+    Computed,
+    Interpolated,
+    computed_in,
+    locate,
+)
+from bt_actions.document.reading.tree import Declared, TreeNode, merged, settings_of, when_of
+from bt_actions.document.yaml.nodes import Mapping, span_of
+from bt_actions.document.yaml.source import Source
+from bt_actions.messages.conversion import Problem, examine
+from bt_actions.messages.fields import FieldType, Message
 
 
 def check_document(checker: Checker) -> None:
     """Report everything that is wrong with names and types to the documents' own sources."""
-    check_declarations(checker)
+    _check_declarations(checker)
     checker.collect_writes()
-    check_actions(checker)
+    _check_actions(checker)
     for node in checker.document.nodes():
         checker.reader = node
-        _check_node(checker, node)
-    check_defaults(checker)
+        if node.kind.name in CHECKS:
+            CHECKS[node.kind.name](checker, node)
+        if node.alias is not None:
+            _check_together(checker, node)
+    _check_defaults(checker)
     check_names(checker)
 
 
-def _check_node(checker: Checker, node: TreeNode) -> None:
-    if node.alias is not None:
-        declared = checker.document.actions.get(node.alias)
-        if declared is not None:
-            check_use(checker, node, declared)
-    elif node.kind is not None and node.kind.name in CHECKS:
-        CHECKS[node.kind.name](checker, node)
+def _check_declarations(checker: Checker) -> None:
+    """Report what is wrong, and make what is declared known to the checker."""
+    document = checker.document
+    for table in (document.inputs, document.outputs, document.topics):
+        for name, declared in table.items():
+            kind = _declared_type(checker, declared, topic=table is document.topics)
+            earlier = checker.declared_at.get(name)
+            if earlier is None:
+                checker.declared_at[name] = declared
+                checker.variables[name] = kind
+                continue
+            hint = None
+            if table is document.outputs:
+                hint = f"give the output a name of its own: set: {{NAME: ${name}}}"
+            own, other = declared, earlier
+            if declared.source is not checker.source:
+                own, other = earlier, declared
+            checker.source.report(
+                "BT216", span_of(own.key), f"{name!r} is declared twice",
+                hint=hint, related=Related(other.place, "first here"),
+            )  # fmt: skip
+            checker.variables[name] = None
+    for declared in document.inputs.values():
+        default = declared.values.get("default", BAD)
+        if default is not BAD:
+            _check_default(checker, declared, default)
+
+
+def _declared_type(checker: Checker, declared: Declared, *, topic: bool) -> FieldType | None:
+    text = declared.values.get("type")
+    if not isinstance(text, str):
+        return None
+    if topic:
+        cls = checker.interface(text, "msg", declared.written("type"), declared.source)
+        return Message(cls) if cls is not None else None
+    try:
+        return parse_type(text, types=checker.types)
+    except TypeNameError as error:
+        code = "BT205" if error.missing else "BT207"
+        checker.source.report(code, span_of(declared.written("type")), str(error))
+        return None
+
+
+def _check_default(checker: Checker, declared: Declared, default: object) -> None:
+    node = declared.written("default")
+    for computed in computed_in(default):
+        checker.source.report(
+            "BT204", span_of(computed.node), "a default is a plain value: it can read nothing"
+        )
+        return
+    kind = checker.variables.get(declared.name)
+    if kind is not None:
+        checker.fit(kind, default, node, known=())
+    checker.finite(default, node)
+
+
+def _check_actions(checker: Checker) -> None:
+    """The actions that are declared here, and of those imported what the nodes take over."""
+    users: dict[str | None, list[dict[str, object]]] = {}
+    if checker.document.imported:
+        for node in checker.document.nodes():
+            users.setdefault(node.alias, []).append(node.values)
+    for declared in checker.document.actions.values():
+        if not isinstance(declared.node, Mapping):
+            continue
+        checker.reader = declared
+        if declared.source is checker.source:
+            cls = checker.action_class(declared)
+            checker.call(declared.values, declared.parts, cls)
+            continue
+        values = _left(declared.values, users.get(declared.name, []))
+        with _within(checker, declared.source, f"the imported action {declared.name!r}"):
+            checker.call(values, declared.parts, checker.action_class(declared))
+
+
+def _check_defaults(checker: Checker) -> None:
+    """The condition in `defaults` is that of each action which has none nearer."""
+    when = when_of(checker.document.defaults)
+    if when is None:
+        return
+    users = {
+        node.alias or node.values.get("type"): node
+        for node in checker.document.nodes()
+        if node.is_action and when_of(settings_of(node, checker.document)) is when
+    }
+    documents = checker.document.with_imports()
+    source = next(one.source for one in documents if when_of(one.values.get("defaults")) is when)
+    with _within(checker, source, "the imported defaults"):
+        for node in users.values():
+            checker.reader = checker.document.actions.get(node.alias or "", checker.document)
+            checker.condition(when, {"result": checker.received(node)})
+
+
+@contextmanager
+def _within(checker: Checker, source: Source, what: str) -> Iterator[None]:
+    """Look at what stands in a source.
+
+    Of one that is imported, what is wrong in this document only is told at the import.
+    """
+    own, written = checker.source, checker.document.node.get("import")
+    if source is own or written is None:
+        yield
+        return
+    checker.source = replace(source, findings=[], errors=0, unread=own.unread)
+    try:
+        yield
+    finally:
+        found, checker.source = checker.source.findings, own
+        for one in found:
+            if one not in source.findings:
+                own.report(
+                    one.code, span_of(written), f"{what}: {one.message}",
+                    hint=one.hint, related=Related(one.place, "written here"),
+                )  # fmt: skip
+
+
+def _check_together(checker: Checker, node: TreeNode) -> None:
+    """Goals that are merged may each be right and not fit together: yaw, and x beside it."""
+    declared = checker.document.actions[node.alias or ""]
+    shared, own = declared.values.get("goal"), node.values.get("goal")
+    if not isinstance(shared, dict) or not isinstance(own, dict):
+        return
+    cls = checker.action_class(declared)
+    if cls is None or not any(isinstance(own[name], dict) for name in own.keys() & shared):
+        return
+
+    def problems(goal: object) -> list[Problem]:
+        return examine(Message(cls.Goal), goal, _is_computed)  # type: ignore[attr-defined]
+
+    told = {*problems(own), *problems(shared)}
+    for problem in problems(merged(shared, own)):
+        if problem not in told:
+            checker.source.report(
+                "BT204", span_of(locate(node.written["goal"], problem.path)), problem.text,
+                related=Related(declared.place, "merged with the goal here"),
+            )  # fmt: skip
+
+
+def _is_computed(value: object, _kind: FieldType, _path: tuple[str | int, ...]) -> bool:
+    return value is BAD or isinstance(value, Computed | Interpolated)
+
+
+def _left(settings: dict[str, object], nearer: list[dict[str, object]]) -> dict[str, object]:
+    """The settings that not everything nearer has others for."""
+    left: dict[str, object] = {}
+    for name, value in settings.items():
+        over = [one[name] for one in nearer if name in one]
+        inner = [one for one in over if isinstance(one, dict)]
+        if len(over) < len(nearer):
+            left[name] = value
+        elif inner and isinstance(value, dict):
+            left[name] = _left(value, inner)
+    return left

@@ -10,16 +10,31 @@ from collections import defaultdict
 from collections.abc import Callable, Container
 from collections.abc import Mapping as MappingType
 from functools import lru_cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from bt_actions.document.checking.infer import Wrong, infer
 from bt_actions.document.checking.unmarked import marked_here, warn_unmarked
-from bt_actions.document.checking.value_types import BOOL, TEXT, named
-from bt_actions.document.checking.variables import infer_variables, items_inside, type_of
+from bt_actions.document.checking.value_types import (
+    BOOL,
+    TEXT,
+    common_type,
+    infer_variables,
+    items_inside,
+    named,
+    type_of_literal,
+)
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
-from bt_actions.document.language.bare import warn_bare_angle, warn_bare_duration
-from bt_actions.document.language.types import Either, TypeNameError, fits, interface_of, misfits
+from bt_actions.document.language.kinds import KINDS, Interface, Kind
+from bt_actions.document.language.types import (
+    Either,
+    TypeNameError,
+    fits,
+    interface_of,
+    misfits,
+    parse_type,
+)
 from bt_actions.document.language.values import (
     BAD,
     Computed,
@@ -30,33 +45,32 @@ from bt_actions.document.language.values import (
     names_file,
 )
 from bt_actions.document.reading.inputs import refuse_infinite
-from bt_actions.document.reading.settings import when_of
-from bt_actions.document.reading.tree import Declared, Document
+from bt_actions.document.reading.tree import Declared, Document, TreeNode, Write, when_of, writes_of
 from bt_actions.document.reading.unread import Doubts
-from bt_actions.document.reading.writes import Write, writes_of
+from bt_actions.document.yaml.mistaken import warn_bare_angle, warn_bare_duration
 from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.messages.conversion import ANGLE, examine
-from bt_actions.messages.fields import FieldType, Message, describe
-from bt_actions.messages.interfaces import DURATION, interface_name
+from bt_actions.messages.fields import FieldType, Listing, Message, describe
+from bt_actions.messages.interfaces import DURATION, RUN_TREE, interface_name
 from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:
     from bt_actions.document.language.classes import Python
 
 Types = MappingType[str, FieldType | None]
-_PARTS = {"action": ("goal", "Goal", "Result"), "srv": ("request", "Request", "Response")}
 
 
 @lru_cache(maxsize=1024)
-def _parts(cls: type | None, kind: str) -> tuple[str, FieldType | None, Types]:
-    """The key and the type of what is sent, and the root of expressions over what comes back."""
-    key, asked, answered = _PARTS[kind]
+def _parts(cls: type | None, interface: Interface) -> tuple[FieldType | None, Types]:
+    """The type of what is sent, and the root of expressions over what comes back."""
     if cls is None:
-        return key, None, {"result": None}
-    return key, Message(getattr(cls, asked)), {"result": Message(getattr(cls, answered))}
+        return None, {interface.root: None}
+    return Message(interface.part(cls, interface.sent)), {
+        interface.root: Message(interface.part(cls, interface.received))
+    }
 
 
 def _all_computed(
@@ -146,7 +160,7 @@ class Checker:
         if items is None:
             return self.variables.get
         return lambda name: (
-            type_of(items[name], self) if name in items else self.variables.get(name)
+            self._type_of(items[name]) if name in items else self.variables.get(name)
         )
 
     def collect_writes(self) -> None:
@@ -157,7 +171,7 @@ class Checker:
                 self.writes[id(node)].append(write)
                 writers[write.name].append(write)
         self._items = items_inside(writers, self.declared_at)
-        infer_variables(writers, self)
+        infer_variables(writers, self.variables, self._type_of)
 
     def action_class(self, declared: Declared) -> type | None:
         name = declared.name
@@ -168,31 +182,77 @@ class Checker:
                 self._classes[name] = self.interface(text, "action", at, declared.source)
         return self._classes[name]
 
+    def written_by(self, node: TreeNode) -> frozenset[str]:
+        """The names of the variables that a node itself writes."""
+        writes = self.writes.get(id(node))
+        return frozenset([write.name for write in writes]) if writes else frozenset()
+
+    def class_of(self, node: TreeNode) -> type | None:
+        """The class of the interface that a node talks over, or None after reporting."""
+        if node.alias is not None:
+            return self.action_class(self.document.actions[node.alias])
+        name = RUN_TREE if node.kind.name == "run_tree" else node.values.get("type")
+        if node.kind.interface is None or not isinstance(name, str):
+            return None
+        return self.interface(name, node.kind.interface.kind, node.written.get("type", node.key))
+
+    def received(self, node: TreeNode) -> FieldType | None:
+        """The type of what comes back to a node: a result, an answer, a message."""
+        cls, interface = self.class_of(node), node.kind.interface
+        return (
+            None
+            if cls is None or not interface
+            else Message(interface.part(cls, interface.received))
+        )
+
+    def declared_type(self, declared: Declared | None) -> FieldType | None:
+        """The type of an input or an output; None where it has none, which is told there."""
+        text = declared.values.get("type") if declared is not None else None
+        try:
+            return parse_type(text, types=self.types) if isinstance(text, str) else None
+        except TypeNameError:
+            return None
+
+    def _type_of(self, write: Write) -> FieldType | None:
+        """The type of what is written, without reporting anything."""
+        node, value = write.node, write.value
+        if node.kind.name == "subtree":
+            outputs = node.included.outputs if node.included is not None else {}
+            return self.declared_type(outputs.get(str(value)))
+        if write.root == "item of" and isinstance(value, list):
+            return common_type([type_of_literal(item) for item in value])
+        if isinstance(value, Interpolated):
+            return TEXT
+        if not isinstance(value, Computed):
+            return type_of_literal(value) if write.root != "item of" else None
+        roots = {write.root: self.received(node)} if write.root else {}
+        kind = self.infer(value.expression, roots, node)[0]
+        if write.root == "item of":
+            return kind.item if isinstance(kind, Listing) else None
+        return kind
+
     def call(
         self,
         values: MappingType[str, object],
         written: MappingType[str, Node],
         cls: type | None,
-        kind: str,
+        kind: Kind = KINDS["action"],
+        more: Types = MappingProxyType({}),
     ) -> None:
-        """Check what an action and a service have in common."""
-        key, asked, roots = _parts(cls, kind)
+        """Check what all kinds with an interface have in common; `more` are further roots."""
+        assert kind.interface is not None
+        key = kind.interface.fields
+        asked, roots = _parts(cls, kind.interface)
+        roots = {**roots, **more} if more else roots
         if key in values and key in written:
             self.value(asked, values[key], written[key])
-        self.condition(values.get("expect"), roots)
+        self.condition(values.get("expect", values.get("until")), roots)
         if "retry" in values:
             self.condition(when_of(values), roots)
-        self.save(values.get("save"), roots)
-
-    def save(self, saved: object, roots: Types) -> None:
-        """Check the places that names are kept from, and that they fit what is declared."""
-        if not isinstance(saved, dict):
-            return
-        for name, place in saved.items():
-            if not isinstance(place, Computed):
-                continue
-            kind = self.expression(place, roots)
-            self.assigns(name, kind, place.node)
+        saved = values.get("save")
+        for name, place in saved.items() if isinstance(saved, dict) else ():
+            if isinstance(place, Computed):
+                self.assigns(name, self.expression(place, roots), place.node)
 
     def assigns(self, name: str, kind: FieldType | None, node: Node) -> None:
         """Check that a value of a type may be written to a variable."""

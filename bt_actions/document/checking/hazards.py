@@ -9,36 +9,40 @@ import itertools
 from collections.abc import Iterator, Mapping
 
 from bt_actions.document.checking.checker import Checker
-from bt_actions.document.checking.missing import find_missing
-from bt_actions.document.checking.order import find_early_reads
+from bt_actions.document.checking.reads import find_early_reads, find_missing
 from bt_actions.document.checking.verdicts import BEGUN, Verdicts
-from bt_actions.document.findings import Related, Span
+from bt_actions.document.findings import Related
 from bt_actions.document.language.values import names_value
-from bt_actions.document.reading.settings import resources_below, shared_settings
-from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.tree import (
+    Declared,
+    Document,
+    TreeNode,
+    resources_below,
+    shared_settings,
+)
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
-from bt_actions.document.yaml.nodes import span_of
+from bt_actions.document.yaml.nodes import Node, span_of
 
 _BUSY = BEGUN | {"wait_until", "running", "python", "retry", "repeat", "for_each"}
 _LOOPED = ("as", "index")
 """What a loop writes for those who want to read it."""
 
 
-def find_hazards(checker: Checker, doubts: Doubts) -> None:
+def find_hazards(checker: Checker) -> None:
     """Report the hazards of a document that was checked, but for those that are not certain."""
-    document = checker.document
-    if document.root is None:
-        return
-    _Hazards(checker, doubts).look(document.root)
+    checker.doubts = Doubts(checker.document)  # anew: the checker found more
+    if checker.document.root is not None:
+        _Hazards(checker).look(checker.document.root)
 
 
 class _Hazards:
-    def __init__(self, checker: Checker, doubts: Doubts) -> None:
+    def __init__(self, checker: Checker) -> None:
         self._checker = checker
-        self._doubts = doubts
+        self._doubts = checker.doubts
         self._document: Document = checker.document
         self._source = checker.source
+        self._report = checker.source.report
         self._verdicts = Verdicts()
         self._at_once = Verdicts(at_once=True)
         self._held: dict[tuple[int, str], dict[str, TreeNode]] = {}
@@ -53,19 +57,16 @@ class _Hazards:
     def look(self, root: TreeNode) -> None:
         self._walk(root, bounded=False)
         self._result_timeouts()
-        find_early_reads(self._checker, self._doubts, root)
-        find_missing(self._checker, self._doubts, root)
+        find_early_reads(self._checker, root)
+        find_missing(self._checker, root)
         self._unused()
-
-    def _report(self, code: str, span: Span, message: str, **more: object) -> None:
-        self._source.report(code, span, message, **more)  # type: ignore[arg-type]
 
     def _walk(self, root: TreeNode, *, bounded: bool) -> None:
         loops: dict[str, TreeNode] = {}
         stack = [(root, bounded, loops)]
         while stack:
             node, inside, around = stack.pop()
-            kind = node.kind.name if node.kind is not None else ""
+            kind = node.kind.name
             if node.alias is not None:
                 self._used.add(node.alias)
             if node.is_action and not inside:
@@ -111,9 +112,9 @@ class _Hazards:
         else:
             self._no_result_timeout(node.key, f"{node.name or 'this action'} may take for ever")
 
-    def _no_result_timeout(self, at: object, message: str) -> None:
+    def _no_result_timeout(self, at: Node, message: str) -> None:
         hint = "timeout: 30 s, or {result: none} where it is meant"
-        self._report("BT301", span_of(at), message, hint=hint)  # type: ignore[arg-type]
+        self._report("BT301", span_of(at), message, hint=hint)
 
     def _result_timeouts(self) -> None:
         for name, node in self._unbounded.items():
@@ -184,10 +185,10 @@ class _Hazards:
         while stack and found is None:
             node = stack.pop()
             inner = node.included.root if node.included is not None else None
-            anew = node.is_action or (node.kind is not None and node.kind.name in BEGUN)
+            anew = node.is_action or node.kind.name in BEGUN
             if anew or (inner is not None and self._restarted(inner)):
                 found = node
-            elif node.kind is None or node.kind.name != "run_once":
+            elif node.kind.name != "run_once":
                 stack.extend(reversed(node.children))
         self._anew[id(root)] = found
         return found
@@ -198,7 +199,7 @@ class _Hazards:
         if found is None:
             below = node.included.root if node.included is not None else None
             within = [*node.children, below] if below is not None else node.children
-            busy = node.is_action or (node.kind is not None and node.kind.name in _BUSY)
+            busy = node.is_action or node.kind.name in _BUSY
             busy = busy or "subscribers" in node.values  # of a publish, which waits for them
             found = busy or any(self._takes_time(each) for each in within)
             self._slow[id(node)] = found
@@ -221,7 +222,7 @@ class _Hazards:
     def _inverted(self, node: TreeNode) -> None:
         """A check fails where nothing has come on its topic; that is a success here."""
         asked = [inner for child in node.children for inner in child.walk()]
-        kinds = {inner.kind.name if inner.kind is not None else "" for inner in asked}
+        kinds = {inner.kind.name for inner in asked}
         if not kinds <= {"sequence", "fallback", "check"}:
             return
         reads = (read for inner in asked for read in self._checker.reads.get(id(inner), ()))
@@ -252,7 +253,7 @@ class _Hazards:
             other = given.get(write.name)
             if other is not None:
                 self._report(
-                    "BT312", span_of(write.written),
+                    "BT312", span_of(node.written.get(write.under, node.key)),
                     f"${write.name} already stands for something else here",
                     related=Related(other.place, "for this"),
                     hint="as: another name",

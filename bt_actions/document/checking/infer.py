@@ -8,7 +8,6 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Mapping
 
-from bt_actions.document.checking.ranges import never_held
 from bt_actions.document.checking.value_types import (
     BOOL,
     FLOAT,
@@ -39,11 +38,21 @@ from bt_actions.messages.fields import (
     describe,
     no_field,
 )
-from bt_actions.messages.interfaces import UnknownInterface
+from bt_actions.messages.interfaces import UnknownInterface, interface_name
 from bt_actions.utilities.suggest import what_it_has
 
 Wrong = tuple[str, str, int, int]
 """A rule's code, a message, and the columns in the expression's text."""
+_RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "geometry_msgs/msg/Quaternion": dict.fromkeys("xyzw", (-1.0, 1.0)),
+    "sensor_msgs/msg/BatteryState": {"percentage": (0.0, 1.0)},
+    "sensor_msgs/msg/NavSatFix": {"latitude": (-90.0, 90.0), "longitude": (-180.0, 180.0)},
+    "sensor_msgs/msg/RelativeHumidity": {"relative_humidity": (0.0, 1.0)},
+}
+"""Fields of common messages that never leave a range, as their .msg files say: BT321."""
+_TURNED: Mapping[type[ast.cmpop], type[ast.cmpop]] = {
+    ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE
+}  # fmt: skip
 
 
 def infer(
@@ -71,7 +80,7 @@ class _Inference:
     ) -> None:
         self.wrong: list[Wrong] = []
         self._fields: dict[ast.expr, tuple[type, str]] = {}
-        """The messages and fields, or items of these, that parts of the expression read."""
+        """The messages and fields that parts of the expression read."""
         self._types = types
         self._expression = expression
         self._roots = roots
@@ -210,9 +219,6 @@ class _Inference:
         size = owner.size
         if size is not None and isinstance(literal, int) and not -size <= literal < size:
             self._wrong(node, f"index {literal} is outside of {size} items")
-        if isinstance(node, ast.Subscript) and node.value in self._fields:
-            cls, name = self._fields[node.value]
-            self._fields[node] = cls, f"{name}[{literal!s}]"
         return owner.item
 
     def _index(self, node: ast.expr, kind: FieldType | None, what: str = "an index") -> None:
@@ -321,10 +327,10 @@ class _Inference:
     def _in_range(self, left: ast.expr, op: ast.cmpop, right: ast.expr) -> None:
         for field, other in ((left, right), (right, left)):
             number = _number_of(other) if field in self._fields else None
-            if number is not None:
-                said = never_held(*self._fields[field], op, number, first=field is left)
-                if said:
-                    self._wrong(other, said, "BT321")
+            if number is None:
+                continue
+            if said := _never_held(*self._fields[field], op, number, first=field is left):
+                self._wrong(other, said, "BT321")
 
     def _call(self, name: str, args: list[ast.expr]) -> FieldType | None:
         if name in ONE_VALUE:
@@ -379,3 +385,20 @@ def _number_of(node: ast.expr) -> int | float | None:
     except (ValueError, ArithmeticError):
         pass  # told of that part itself
     return None
+
+
+def _never_held(cls: type, name: str, op: ast.cmpop, number: float, *, first: bool) -> str | None:
+    """What is wrong with a field that is compared with a number; `first` is the field, or not."""
+    allowed = _RANGES.get(interface_name(cls), {}).get(name)
+    kind = type(op) if first else _TURNED.get(type(op), type(op))
+    if allowed is None or kind not in (*_TURNED, ast.Eq, ast.NotEq):
+        return None
+    least, most = allowed
+    above = number > most or (number == most and kind is ast.Gt)
+    if not above and number >= least:
+        return None
+    ordered = kind in _TURNED
+    holds = (kind in (ast.Lt, ast.LtE)) is above if ordered else kind is ast.NotEq
+    outcome = "true" if holds else "false"
+    percent = f"; write {number / 100:g}" if allowed == (0.0, 1.0) and 2 <= number <= 100 else ""
+    return f"{cls.__name__}.{name} is {least:g} to {most:g}: this is always {outcome}{percent}"

@@ -8,14 +8,12 @@ from types import MappingProxyType
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.value_types import FLOAT, INTEGER, named
 from bt_actions.document.findings import Related
-from bt_actions.document.language.types import Record, TypeNameError, fits, misfits, parse_type
+from bt_actions.document.language.types import Record, fits, misfits
 from bt_actions.document.language.values import Computed, computed_in, constant_of, locate
-from bt_actions.document.reading.settings import when_of
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
 from bt_actions.document.yaml.nodes import Node, span_of
-from bt_actions.messages.fields import FieldType, Listing, Message, Scalar
-from bt_actions.messages.interfaces import RUN_TREE
+from bt_actions.messages.fields import FieldType, Listing, Scalar
 from bt_actions.utilities.suggest import did_you_mean, listing
 
 
@@ -76,11 +74,7 @@ def _input_type(checker: Checker, included: Document, name: str, at: Node) -> Fi
         if not checker.doubts_of(included).declares(name):
             _no_such(checker, included, "input", name, included.inputs, at)
         return None
-    text = declared.values.get("type")
-    try:
-        return parse_type(text, types=checker.types) if isinstance(text, str) else None
-    except TypeNameError:
-        return None  # reported where it is declared
+    return checker.declared_type(declared)
 
 
 def _no_such(
@@ -108,23 +102,18 @@ def _outputs(checker: Checker, node: TreeNode) -> None:
         if declared is None:
             _no_such(checker, included, "output", output, included.outputs, inner)
             continue
-        text = declared.values.get("type")
-        if isinstance(text, str):
-            try:
-                checker.assigns(key.text, parse_type(text, types=checker.types), inner)
-            except TypeNameError:
-                continue  # reported where it is declared
+        checker.assigns(key.text, checker.declared_type(declared), inner)
 
 
-def _condition_of(key: str) -> Callable[[Checker, TreeNode], None]:
-    return lambda checker, node: checker.condition(node.values.get(key), {})
+def _condition(checker: Checker, node: TreeNode) -> None:
+    checker.condition(node.values.get(node.kind.reads), {})
 
 
-def _number_of(
-    key: str, wanted: FieldType, least: float = 0, *, zero: bool = True
+def _number(
+    wanted: FieldType, least: float = 0, *, zero: bool = True
 ) -> Callable[[Checker, TreeNode], None]:
     def check(checker: Checker, node: TreeNode) -> None:
-        value = node.values.get(key)
+        value = node.values.get(node.kind.reads)
         if not isinstance(value, Computed):
             return
         given = checker.expression(value, {})
@@ -162,19 +151,11 @@ def _for_each(checker: Checker, node: TreeNode) -> None:
         checker.value(None, items, node.written["in"], prose=True)
 
 
-def _interface(checker: Checker, node: TreeNode, kind: str) -> type | None:
-    name = node.values.get("type")
-    return checker.interface(name, kind, node.written["type"]) if isinstance(name, str) else None
-
-
-def _call_of(kind: str) -> Callable[[Checker, TreeNode], None]:
-    return lambda checker, node: checker.call(
-        node.values, node.written, _interface(checker, node, kind), kind
-    )
+def _call(checker: Checker, node: TreeNode) -> None:
+    checker.call(node.values, node.written, checker.class_of(node), node.kind)
 
 
 def _run_tree(checker: Checker, node: TreeNode) -> None:
-    cls = checker.interface(RUN_TREE, "action", node.key)
     text = node.values.get("tree")
     if text is not None:
         checker.value(Scalar("string"), text, node.written["tree"], prose=True)
@@ -182,30 +163,17 @@ def _run_tree(checker: Checker, node: TreeNode) -> None:
     if inputs is not None and written is not None:
         checker.value(None, inputs, written)
         checker.finite(inputs, written)
-    roots = {"result": None if cls is None else Message(cls.Result), "outputs": None}  # type: ignore[attr-defined]
-    for condition in (node.values.get("expect"), when_of(node.values)):
-        checker.condition(condition, roots)
-    checker.save(node.values.get("save"), roots)
+    checker.call(node.values, node.written, checker.class_of(node), node.kind, {"outputs": None})
 
 
 def _publish(checker: Checker, node: TreeNode) -> None:
-    cls = _interface(checker, node, "msg")
-    if "message" in node.values:
-        kind = None if cls is None else Message(cls)
-        checker.value(kind, node.values["message"], node.written["message"])
+    _call(checker, node)
     alone = "timeout" in node.values and "subscribers" not in node.values
     if alone and not checker.doubts.own(node):
         said = "'timeout' is how long to wait for 'subscribers', which are missing"
         checker.source.report(
             "BT108", span_of(node.written["timeout"]), said, hint="subscribers: 1"
         )
-
-
-def _wait_for_message(checker: Checker, node: TreeNode) -> None:
-    cls = _interface(checker, node, "msg")
-    roots = {"message": None if cls is None else Message(cls)}
-    checker.condition(node.values.get("until"), roots)
-    checker.save(node.values.get("save"), roots)
 
 
 def _set(checker: Checker, node: TreeNode) -> None:
@@ -276,24 +244,24 @@ def _python(checker: Checker, node: TreeNode) -> None:
 
 CHECKS: Mapping[str, Callable[[Checker, TreeNode], None]] = MappingProxyType(
     {
-        "action": _call_of("action"),
-        "check": _condition_of("check"),
+        "action": _call,
+        "check": _condition,
         "for_each": _for_each,
         "log": _log,
         "parallel": _parallel,
         "publish": _publish,
         "python": _python,
-        "repeat": _number_of("times", INTEGER),
-        "retry": _number_of("attempts", INTEGER, 1),
+        "repeat": _number(INTEGER),
+        "retry": _number(INTEGER, 1),
         "run_tree": _run_tree,
-        "service": _call_of("srv"),
+        "service": _call,
         "set": _set,
         "subtree": _subtree,
-        "timeout": _number_of("after", FLOAT, zero=False),
-        "wait": _number_of("wait", FLOAT),
-        "wait_for_message": _wait_for_message,
-        "wait_until": _condition_of("wait_until"),
-        "while": _condition_of("while"),
+        "timeout": _number(FLOAT, zero=False),
+        "wait": _number(FLOAT),
+        "wait_for_message": _call,
+        "wait_until": _condition,
+        "while": _condition,
     }
 )
 """The checks by the name of the kind."""

@@ -12,15 +12,21 @@ from typing import NamedTuple
 
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.findings import Place, Related
-from bt_actions.document.reading.settings import join_names, server_of, shared_settings, text_of
-from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.language.kinds import Interface
+from bt_actions.document.reading.tree import (
+    Declared,
+    Document,
+    TreeNode,
+    join_names,
+    server_of,
+    shared_settings,
+    text_of,
+)
 from bt_actions.document.yaml.nodes import Node, span_of
 from bt_actions.messages.interfaces import RUN_TREE
 
 _WORDS = {"action": "the action server", "srv": "the service", "msg": "the topic"}
-_KINDS = {"action": ("action", "server"), "service": ("srv", "server"),
-          "publish": ("msg", "publish"), "wait_for_message": ("msg", "topic")}  # fmt: skip
-"""What kinds of nodes connect to, and the key that names it."""
+_TOPIC = Interface("msg", "topic")
 _MOST = 10_000
 """Names of a tree and those that it includes that are compared: subtrees can multiply them."""
 _Name = tuple[str, str]
@@ -61,26 +67,27 @@ def _uses(document: Document, known: _Known) -> Iterator[tuple[_Name, _Use]]:
     """The names that a document uses, in its own namespace; `known` keeps those of the included."""
     for declared in document.topics.values():
         at = _place(declared, document, document.node.get("import") or document.node)
-        yield from _use("msg", "topic", declared.values, at, document)
+        yield from _use(_TOPIC, declared.values, at, document)
     seen: set[tuple[str | None, str]] = set()
     for node in document.nodes():
-        kind, key = _KINDS.get(node.kind.name if node.kind is not None else "action", ("", ""))
-        namespace = text_of(node.values, "namespace")
-        if node.alias is not None:
+        interface, namespace = node.kind.interface, text_of(node.values, "namespace")
+        if node.included is not None:
+            yield from _included(node, document, known)
+        elif interface is None:
+            continue
+        elif node.alias is not None:
             if (node.alias, namespace) in seen or node.alias not in document.actions:
                 continue
             seen.add((node.alias, namespace))
             settings = {**shared_settings(node.alias, document), **node.values}
             at = _place(document.actions[node.alias], document, node.key)
-            yield from _use("action", "server", settings, at, document)
-        elif node.included is not None:
-            yield from _included(node, document, known)
-        elif node.kind is not None and node.kind.name == "run_tree":
+            yield from _use(interface, settings, at, document)
+        elif node.kind.name == "run_tree":
             values = {"type": RUN_TREE, "server": server_of(node.values), "namespace": namespace}
-            yield from _use("action", "server", values, (node.place, node.key), document)
-        elif kind:
+            yield from _use(interface, values, (node.place, node.key), document)
+        else:
             at = node.place, node.written.get("type", node.key)
-            yield from _use(kind, key, node.values, at, document)
+            yield from _use(interface, node.values, at, document)
 
 
 def _place(declared: Declared, document: Document, used: Node) -> tuple[Place, Node]:
@@ -103,13 +110,12 @@ def _included(node: TreeNode, document: Document, known: _Known) -> Iterator[tup
 
 
 def _use(
-    kind: str,
-    key: str,
+    interface: Interface,
     values: Mapping[str, object],
     at: tuple[Place, Node],
     document: Document,
 ) -> Iterator[tuple[_Name, _Use]]:
-    name, given = text_of(values, key), text_of(values, "type")
+    name, given, kind = text_of(values, interface.name), text_of(values, "type"), interface.kind
     if name and given:
         package, _, short = given.partition("/")
         full = join_names(document.namespace, text_of(values, "namespace"), name)

@@ -9,9 +9,9 @@ import re
 from collections.abc import Container
 
 from bt_actions.document.language.values import computes, names_file, names_value
-from bt_actions.document.yaml.inner import inner_span
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
+from bt_actions.document.yaml.written import inner_span
 
 _PATH = r"([A-Za-z]\w*(?:\.\w+)*)"
 _FORMS = re.compile(
@@ -35,8 +35,11 @@ def warn_unmarked(value: Node, source: Source, known: Container[str], *, prose: 
             marked = not _SIGNS.isdisjoint(node.text) and _FORMS.search(node.text)
             if marked and not names_file(node.text):
                 _in_other_words(node, source, known)
-            if not prose and "$" not in node.text:
-                _bare(node, source, known)
+            if not prose and (right := marked_here(node, source, known)) is not None:
+                source.report(
+                    "BT315", span_of(node), f"{node.text!r} is text here: no variable is read",
+                    hint=f"{right}, or put it in quotes to mean the text",
+                )  # fmt: skip
         elif isinstance(node, Mapping):
             waiting.extend([inner for _, inner in reversed(node.pairs)])
         elif isinstance(node, Listing):
@@ -65,12 +68,3 @@ def marked_here(node: Node, source: Source, known: Container[str]) -> str | None
         return None
     source.unread.meant.update(name for name in _NAME.findall(node.text) if name in known)
     return f"write {marked}" if names_value(marked) else f"write '= {marked}' to compute it"
-
-
-def _bare(node: Scalar, source: Source, known: Container[str]) -> None:
-    right = marked_here(node, source, known)
-    if right is not None:
-        source.report(
-            "BT315", span_of(node), f"{node.text!r} is text here: no variable is read",
-            hint=f"{right}, or put it in quotes to mean the text",
-        )  # fmt: skip

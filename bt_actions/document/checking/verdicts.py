@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from bt_actions.document.language.values import computed_in
-from bt_actions.document.reading.settings import settings_of
-from bt_actions.document.reading.tree import Document, TreeNode
+from bt_actions.document.reading.tree import Document, TreeNode, settings_of
 
 
 class Can(NamedTuple):
@@ -39,7 +38,7 @@ class Verdicts:
 
     def of(self, node: TreeNode) -> Can:
         """How a node can end."""
-        kind = node.kind.name if node.kind is not None else "action"
+        kind = node.kind.name
         if kind in _OPEN and not self._at_once:
             return _EITHER
         found = self._known.get(id(node))
@@ -116,7 +115,7 @@ class Verdicts:
         return found
 
     def _add_up(self, node: TreeNode, document: Document) -> float:
-        kind = node.kind.name if node.kind is not None else ""
+        kind = node.kind.name
         if node.is_action:
             settings = settings_of(node, document)
             return _tries(_deadline(settings, "result"), settings.get("retry"))

@@ -6,6 +6,7 @@ file has changed or when it came from standard input.
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -44,6 +45,31 @@ class Severity(StrEnum):
 
     ERROR = "error"
     WARNING = "warning"
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What a code stands for, with two trees, or for what no tree can show with two commands."""
+
+    code: str
+    title: str
+    text: str
+    wrong: str
+    right: str
+    severity: Severity = Severity.ERROR
+
+    @property
+    def language(self) -> str:
+        """What the examples are written in."""
+        return "yaml" if self.wrong.startswith(("tree:", "- ")) else "sh"
+
+    def page(self) -> str:
+        """All of it as plain text."""
+        title = f"{self.code}: {self.title} ({self.severity})"
+        parts = [title, "", textwrap.fill(self.text, 88), ""]
+        for word, example in (("Wrong", self.wrong), ("Right", self.right)):
+            parts += [f"{word}:", "", textwrap.indent(example.rstrip("\n"), "    "), ""]
+        return "\n".join(parts)
 
 
 @dataclass(frozen=True, slots=True)

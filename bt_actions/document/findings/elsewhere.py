@@ -84,9 +84,6 @@ _KEYS: dict[str, tuple[str, ...]] = {
         "topicname": ("topic",),
         "interface actiontype servicetype topictype messagetype msgtype": ("type",),
         "msg data": ("message", "request", "goal"),
-        "nodes steps tasks body do": ("children", "child"),
-        "items over list": ("in",),
-        "var loopvar": ("as",),
     }.items()
     for word in words.split()
 }
@@ -115,10 +112,6 @@ _TYPES = _table(
         "write float64": "double real",
         "write float32 or float64": "float number",
         "write int32 or int64": "int integer",
-        "write uint32 or uint64": "uint unsigned",
-        "write int64": "long",
-        "write int16": "short",
-        "write uint8": "char",
         "write bool": "boolean",
         "write string": "str text",
         "write float64 for seconds": "duration time",

@@ -1,96 +1,267 @@
-"""The rules a document is checked by: their codes, which never change, and how grave each is.
+"""The rules a document is checked by, each with a wrong and a right example, which are tested.
 
-BT1xx is about the text, BT2xx about names and types, BT3xx about hazards. `pages.py` explains
-them; a test sees to it that each has a page.
+BT1xx is about the text, BT2xx about names and types, BT3xx (`hazards.py`) about hazards on a robot.
+A code never changes. `bt-actions explain` prints the rules, and docs/rules.md is made of them.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from types import MappingProxyType
 
-from bt_actions.document.findings import Severity
+from bt_actions.document.findings import Rule, Severity
+from bt_actions.document.findings.hazards import HAZARDS, MOVE, SUCCESS, moving, tree
 
-
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """What a code stands for."""
-
-    code: str
-    title: str
-    severity: Severity = Severity.ERROR
-
-
-def _warning(code: str, title: str) -> Rule:
-    return Rule(code, title, Severity.WARNING)
-
-
-RULES = MappingProxyType(
-    {
-        rule.code: rule
-        for rule in (
-            Rule("BT100", "the file cannot be read"),
-            Rule("BT101", "the file is no text"),
-            Rule("BT102", "this is not YAML"),
-            Rule("BT103", "a tab cannot indent YAML"),
-            Rule("BT104", "a key is here twice"),
-            Rule("BT105", "nested too deep, or too large when unfolded"),
-            Rule("BT106", "the document is not a tree"),
-            Rule("BT107", "unknown key"),
-            Rule("BT108", "a key is missing"),
-            Rule("BT109", "a value has the wrong form"),
-            Rule("BT110", "a value is out of its range"),
-            Rule("BT111", "a node without a kind"),
-            Rule("BT112", "a node with two kinds"),
-            Rule("BT113", "a name that cannot be used"),
-            Rule("BT114", "this is not an expression"),
-            Rule("BT115", "a dollar sign that refers to nothing"),
-            _warning("BT116", "a text was cut by '#'"),
-            Rule("BT117", "{x} is a mapping"),
-            Rule("BT118", "[ or { ends a text inside { } and [ ]"),
-            Rule("BT119", "an ignore that names no rule"),
-            Rule("BT120", "an ignore that silences nothing"),
-            Rule("BT121", "a name that ROS does not take"),
-            Rule("BT201", "unknown kind or action"),
-            Rule("BT202", "unknown variable"),
-            Rule("BT203", "a message has no such field"),
-            Rule("BT204", "a value does not fit its type"),
-            Rule("BT205", "a type is not installed"),
-            Rule("BT206", "an expression does not fit its types"),
-            Rule("BT207", "unknown type"),
-            Rule("BT208", "an action's name hides a kind or a key of nodes"),
-            Rule("BT209", "a tree that is included cannot be read"),
-            Rule("BT210", "a tree that includes itself"),
-            Rule("BT211", "an input is missing"),
-            Rule("BT212", "unknown input"),
-            Rule("BT213", "unknown output"),
-            Rule("BT214", "a class cannot be used as a behaviour"),
-            Rule("BT215", "arguments do not fit"),
-            Rule("BT216", "a name is declared twice"),
-            Rule("BT217", "one name with two types"),
-            _warning("BT301", "no result timeout"),
-            _warning("BT302", "a variable is read before anything writes it"),
-            _warning("BT303", "two parallel branches need one resource"),
-            _warning("BT304", "a loop without a limit"),
-            _warning("BT305", "a child that is never reached"),
-            _warning("BT306", "a reactive composite starts what takes time again"),
-            _warning("BT307", "a timeout shorter than what it holds"),
-            _warning("BT308", "an input that nothing uses"),
-            _warning("BT309", "an action or a topic that nothing uses"),
-            _warning("BT310", "a variable that nothing reads"),
-            _warning("BT311", "an output that nothing writes"),
-            _warning("BT312", "a loop's item under a name that is taken"),
-            _warning("BT313", "a key that not every item has"),
-            _warning("BT314", "an inverted check of what nobody may know"),
-            _warning("BT315", "a text that holds a variable's name"),
-            _warning("BT316", "a timer that goes by the wall clock"),
-            _warning("BT317", "a long duration without a unit"),
-            _warning("BT318", "a large angle without a unit"),
-            _warning("BT319", "a name that holds a variable"),
-            _warning("BT320", "a branch that fails for the same missing value"),
-            _warning("BT321", "a comparison with what a field never holds"),
-            _warning("BT322", "a text in typographic quotes"),
-        )
-    }
-)
+_CAFE = r"printf 'tree: t\nroot: {success: Caf\351}\n' "
+_RULES = (
+    Rule("BT100", "the file cannot be read",
+        "The file is not there, is a directory, may not be read, or is larger than a tree can be. "
+        "Trees are found by their path, or by the name of an installed tree. (The examples are "
+        "commands of a shell.)",
+        "bt-actions check pick_and_plac\n",
+        "bt-actions check pick_and_place\n",
+    ),
+    Rule("BT101", "the file is no text",
+        "Trees are written in UTF-8, without control characters. Save the file as UTF-8; most "
+        "editors can. (The examples are commands of a shell: the é of Latin-1, as it is and "
+        "converted.)",
+        _CAFE + "| bt-actions check -\n",
+        _CAFE + "| iconv -f latin1 -t utf-8 | bt-actions check -\n",
+    ),
+    Rule("BT102", "this is not YAML",
+        "The text is not YAML, so that nothing else in it can be checked. Most often the "
+        "indentation differs from the lines around, or a text with ': ' needs quotes.",
+        tree("root:\n  log: ready: go\n"),
+        tree('root:\n  log: "ready: go"\n'),
+    ),
+    Rule("BT103", "a tab cannot indent YAML",
+        "YAML is indented with spaces. Set the editor to insert spaces for the tab key.",
+        tree("root:\n\tsuccess: Done\n"),
+        tree("root:\n  success: Done\n"),
+    ),
+    Rule("BT104", "a key is here twice",
+        "A key stands twice in one mapping. YAML tools keep one of the two, and not all the same "
+        "one.",
+        tree("root:\n  success: Done\n  success: Again\n"),
+        tree("root:\n  success: Done\n"),
+    ),
+    Rule("BT105", "nested too deep, or too large when unfolded",
+        "The document is nested deeper than 200 levels, its tree and all that it includes is more "
+        "than 200 nodes deep, it stands in more than 50 trees or 100 files, an anchor holds "
+        "itself, or aliases and subtrees unfold to more nodes than a tree can have.",
+        tree("root: &loop\n  sequence: Loop\n  children: [*loop]\n"),
+        tree("root:\n  repeat: Loop\n  times: 3\n  child: {success: Done}\n"),
+    ),
+    Rule("BT106", "the document is not a tree",
+        "A tree is one mapping, with a name under 'tree' and its nodes under 'root'. One file "
+        "holds one tree.",
+        "- success: Done\n",
+        tree(SUCCESS),
+    ),
+    Rule("BT107", "unknown key",
+        "No such key can stand here. Nothing is ignored silently: a misspelt key would otherwise "
+        "do nothing, and nobody would know.",
+        tree("root:\n  sequence: Work\n  memroy: false\n  children: [{success: Done}]\n"),
+        tree("root:\n  sequence: Work\n  memory: false\n  children: [{success: Done}]\n"),
+    ),
+    Rule("BT108", "a key is missing",
+        "A key that must be there is missing.",
+        tree("root:\n  invert: Not done\n"),
+        tree("root:\n  invert: Not done\n  child: {success: Done}\n"),
+    ),
+    Rule("BT109", "a value has the wrong form",
+        "A value is a list, a mapping or a text where another form is needed. YAML 1.2 reads "
+        "'yes', 'no', 'on' and 'off' as texts: write true and false.",
+        tree("root:\n  sequence: Work\n  memory: no\n  children: [{success: Done}]\n"),
+        tree("root:\n  sequence: Work\n  memory: false\n  children: [{success: Done}]\n"),
+    ),
+    Rule("BT110", "a value is out of its range",
+        "The value is of the right form, but cannot be: an unknown word, a duration with an "
+        "unknown unit, a number out of its range. Units of time are ns, us, ms, s, sec, min and h;"
+        " a bare number is seconds.",
+        tree("root: {wait: 5 sconds}\n"),
+        tree("root: {wait: 5 s}\n"),
+    ),
+    Rule("BT111", "a node without a kind",
+        "One key of a node says what it is: a kind, or an action that the tree declares. This node"
+        " has none.",
+        tree("root: {name: Done}\n"),
+        tree(SUCCESS),
+    ),
+    Rule("BT112", "a node with two kinds",
+        "One key of a node says what it is; here are two. Most often the dash that begins the next"
+        " node is missing.",
+        tree("root:\n  sequence: Work\n  fallback: Else\n  children: [{success: Done}]\n"),
+        tree(
+            "root:\n  sequence: Work\n  children:\n    - fallback: Else\n"
+            "      children: [{success: Done}]\n"
+        ),
+    ),
+    Rule("BT113", "a name that cannot be used",
+        "Names of nodes are one line without a colon, since tools that draw trees take 'a:b' for a"
+        " port of the node 'a'. Names of variables and actions are letters, digits and "
+        "underscores.",
+        tree('root: {success: "Step 1: done"}\n'),
+        tree('root: {success: "Step 1, done"}\n'),
+    ),
+    Rule("BT114", "this is not an expression",
+        "Expressions are Python's comparisons, arithmetic, and/or/not, 'in', fields and indices, "
+        "with len, abs, min and max. A variable is written $name.",
+        tree("inputs: {level: float64}\nroot: {check: $level = 1}\n"),
+        tree("inputs: {level: float64}\nroot: {check: $level == 1}\n"),
+    ),
+    Rule("BT115", "a dollar sign that refers to nothing",
+        "Inside a text, $(name) stands for a value, and $$ for a dollar sign. A value that is "
+        "nothing but $name keeps its type.",
+        tree("inputs: {level: float64}\nroot: {log: The level is $level now}\n"),
+        tree("inputs: {level: float64}\nroot: {log: The level is $(level) now}\n"),
+    ),
+    Rule("BT116", "a text was cut by '#'",
+        "A '#' behind a space begins a comment, wherever it stands. Put the text in quotes where "
+        "it belongs to it. Where a space follows the '#', a comment was meant, and nothing is "
+        "said; nor is it behind numbers, times and single words of the language.",
+        tree("root: \n  success: Part #3\n"),
+        tree('root: \n  success: "Part #3"\n'),
+        Severity.WARNING,
+    ),
+    Rule("BT117", "{x} is a mapping",
+        "In YAML {x} is a mapping of the key x to nothing. A variable is written $x.",
+        moving("inputs: {far: float64}\nroot:\n  move: Go\n  goal: {distance: {far}}\n"),
+        moving("inputs: {far: float64}\nroot:\n  move: Go\n  goal: {distance: $far}\n"),
+    ),
+    Rule("BT118", "[ or { ends a text inside { } and [ ]",
+        "Inside { } and [ ], an unquoted '[' or '{' ends the text before it. Write the index with "
+        "a dot, a variable without braces, or put the value in quotes.",
+        moving("inputs: {d: 'float64[]'}\nroot:\n  move: Go\n  goal: {distance: $d[0]}\n"),
+        moving("inputs: {d: 'float64[]'}\nroot:\n  move: Go\n  goal: {distance: $d.0}\n"),
+    ),
+    Rule("BT119", "an ignore that names no rule",
+        "An ignore names the warnings it silences: # bt: ignore[BT301] and why. An error cannot be"
+        " silenced.",
+        tree("root: {success: Done}  # bt: ignore\n"),
+        tree("root:\n  retry: Ever  # bt: ignore[BT304] an operator stops it\n"
+             "  child: {success: Done}\n"),
+    ),
+    Rule("BT120", "an ignore that silences nothing",
+        "This ignore silences nothing. It may have been of use once; now it would hide what comes "
+        "later.",
+        tree("root: {success: Done}  # bt: ignore[BT304] no longer a retry\n"),
+        tree(SUCCESS),
+    ),
+    Rule("BT121", "a name that ROS does not take",
+        "The names of topics, services, actions and namespaces are letters, digits and underscores"
+        " between slashes; no part begins with a digit. '/' at the beginning makes a name "
+        "absolute, '~/' one of the node's own. ROS refuses all others when the tree starts.",
+        tree("root: {publish: the lamp, type: std_msgs/msg/Bool}\n"),
+        tree("root: {publish: the_lamp, type: std_msgs/msg/Bool}\n"),
+    ),
+    Rule("BT201", "unknown kind or action",
+        "No kind of node has this name, and the tree declares no action of this name.",
+        moving("root:\n  sequence: Work\n  children:\n    - mvoe: Go\n    - move: Back\n"),
+        moving("root:\n  sequence: Work\n  children:\n    - move: Go\n    - move: Back\n"),
+    ),
+    Rule("BT202", "unknown variable",
+        "A tree sees only its own names: its inputs, outputs and topics, and what its nodes save, "
+        "set or loop over.",
+        tree("inputs: {level: float64}\nroot: {check: $levle > 0.2}\n"),
+        tree("inputs: {level: float64}\nroot: {check: $level > 0.2}\n"),
+    ),
+    Rule("BT203", "a message has no such field",
+        "The ROS message that this is about has no field of this name. `bt-actions interfaces show "
+        "TYPE` prints what it has.",
+        moving("root:\n  move: Go\n  goal: {distnace: 2.0}\n"),
+        moving("root:\n  move: Go\n  goal: {distance: 2.0}\n"),
+    ),
+    Rule("BT204", "a value does not fit its type",
+        "A value does not fit the type that is needed. A whole number is a fine float; a fraction "
+        "is no whole number, and a number in quotes is a text.",
+        moving('root:\n  move: Go\n  goal: {distance: "2.0"}\n'),
+        moving("root:\n  move: Go\n  goal: {distance: 2.0}\n"),
+    ),
+    Rule("BT205", "a type is not installed",
+        "The package of this action, service or message is not installed here, or has none of this"
+        " name. `bt-actions interfaces list` prints what there is. Source the workspace that it is "
+        "built in; without a workspace, `bt-actions interfaces build PATH` builds and installs the "
+        "package from its sources. Or check with --no-types.",
+        "tree: example\n" + MOVE.replace("MoveRobot", "MoveRobt")
+        + "root: {move: Go, goal: {distance: 1.0}}\n",
+        moving("root: {move: Go, goal: {distance: 1.0}}\n"),
+    ),
+    Rule("BT206", "an expression does not fit its types",
+        "An expression does something that the types of its parts do not allow.",
+        tree("inputs: {label: string}\nroot: {check: $label > 1}\n"),
+        tree("inputs: {label: string}\nroot: {check: len($label) > 1}\n"),
+    ),
+    Rule("BT207", "unknown type",
+        "This names no type. Plain types are bool, string, float32, float64, byte, and int and "
+        "uint with 8 to 64 bits; others are package/msg/Name. Lists are written float64[], "
+        "float64[3] and float64[<=3].",
+        tree("inputs: {level: float}\nroot: {check: $level > 1}\n"),
+        tree("inputs: {level: float64}\nroot: {check: $level > 1}\n"),
+    ),
+    Rule("BT208", "an action's name hides a kind or a key of nodes",
+        "An action's name may not be that of a kind, or of a key that nodes have: nobody could "
+        "tell them apart.",
+        "tree: example\n" + MOVE.replace("  move:", "  wait:") + "root: {wait: 5 s}\n",
+        moving("root:\n  sequence: Work\n  children: [{move: Go}, {wait: 5 s}]\n"),
+    ),
+    Rule("BT209", "a tree that is included cannot be read",
+        "A tree that is included, or a file that is imported, cannot be read. It is looked for "
+        "beside this file, then by its name in BT_ACTIONS_TREE_PATH and in the installed packages.",
+        tree("root: {subtree: no_such_tree.yaml}\n"),
+        tree("root: {subtree: recover}\n"),
+    ),
+    Rule("BT210", "a tree that includes itself",
+        "A tree includes itself, directly or by way of others: it would never end. Use 'repeat' or"
+        " 'retry'.",
+        tree("root: {subtree: wrong.yaml}\n"),
+        tree("root:\n  repeat: Again\n  times: 2\n  child: {success: Done}\n"),
+    ),
+    Rule("BT211", "an input is missing",
+        "The tree that is included has an input without a default, and 'with' does not give it. "
+        "(The wrong example includes a tree with such an input, needs_input.yaml.)",
+        tree("root: {subtree: needs_input.yaml}\n"),
+        tree("root: {subtree: needs_input.yaml, with: {speed: 1.0}}\n"),
+    ),
+    Rule("BT212", "unknown input",
+        "The tree that is included has no input of this name.",
+        tree("root: {subtree: recover, with: {hoem: 0.0}}\n"),
+        tree("root: {subtree: recover, with: {home: 0.0}}\n"),
+    ),
+    Rule("BT213", "unknown output",
+        "The tree that is included has no output of this name.",
+        tree("outputs: {at: float64}\nroot: {subtree: pick_and_place, save: {at: final_pos}}\n"),
+        tree("outputs: {at: float64}\nroot: {subtree: pick_and_place, save: {at: final_pose}}\n"),
+    ),
+    Rule("BT214", "a class cannot be used as a behaviour",
+        "'python' names a class that can be imported here, and that is a py_trees behaviour.",
+        tree("root: {python: py_trees.behaviours.Succes}\n"),
+        tree("root: {python: py_trees.behaviours.Success}\n"),
+    ),
+    Rule("BT215", "arguments do not fit",
+        "The arguments do not fit the constructor of the class. Its name is given by the node. "
+        "Where a parameter is annotated with an enum, the argument is the name of a member.",
+        tree("root: {python: py_trees.behaviours.Periodic, arguments: {number: 3}}\n"),
+        tree("root: {python: py_trees.behaviours.Periodic, arguments: {n: 3}}\n"),
+    ),
+    Rule("BT216", "a name is declared twice",
+        "Two things have one name, so that it is not clear which is meant.",
+        tree("inputs: {door: bool}\ntopics: {door: {topic: door, type: std_msgs/msg/Bool}}\n"
+             "root: {check: $door}\n"),
+        tree("topics: {door: {topic: door, type: std_msgs/msg/Bool}}\n"
+             "root: {check: $door.data}\n"),
+    ),
+    Rule("BT217", "one name with two types",
+        "A name of ROS has one type. A tree, with all that it includes, uses this action server, "
+        "service or topic with two: the second could not even be connected to. A relative name is "
+        "read as in the namespace /: where the tree runs in another, 'robot' and '/robot' differ, "
+        "and the tree's own 'namespace' says so.",
+        tree("root:\n  sequence: S\n  children:\n"
+             "    - {publish: said, type: std_msgs/msg/String}\n"
+             "    - {publish: said, type: std_msgs/msg/Bool}\n"),
+        tree("root:\n  sequence: S\n  children:\n"
+             "    - {publish: said, type: std_msgs/msg/String}\n"
+             "    - {publish: on, type: std_msgs/msg/Bool}\n"),
+    ),
+)  # fmt: skip
+RULES = MappingProxyType({rule.code: rule for rule in (*_RULES, *HAZARDS)})
 """Every rule by its code."""

@@ -40,12 +40,10 @@ class Misfit(NamedTuple):
 
 def refusal(path: object, python: Python) -> str:
     """Why a ``python:`` node may not name this class, before anything is imported; or ""."""
-    if isinstance(python, bool):
-        return (
-            ""
-            if python
-            else "python: is not allowed here, because it runs code that the tree names"
-        )
+    if python is True:
+        return ""
+    if python is False:
+        return "python: is not allowed here, because it runs code that the tree names"
     if isinstance(path, str) and path.partition(".")[0] in python:
         return ""
     named = f"those of {listing(python)}" if python else "none"

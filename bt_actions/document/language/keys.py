@@ -7,6 +7,7 @@ reference (docs/yaml.md) are all made from these two.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
 
 from bt_actions.document.language.ros_names import RosName
@@ -17,12 +18,15 @@ from bt_actions.document.language.scalars import (
     Name,
     Place,
     Quantity,
+    Schema,
+    Shape,
     Text,
     TypeName,
     Whole,
 )
-from bt_actions.document.language.shape import Shape
 from bt_actions.document.language.shapes import AnyValue, Key, ListOf, Record, Table, Values
+from bt_actions.document.yaml.nodes import Node
+from bt_actions.document.yaml.source import Source
 from bt_actions.goals.policy import RETRYABLE, Busy
 
 
@@ -132,27 +136,23 @@ _SHARED = (
 )
 
 
-class _NodeShape:
-    """A node of the tree; `reading/nodes.py` reads it, since it needs the whole document."""
+@dataclass(frozen=True)
+class _Nodes:
+    """What holds nodes of the tree; `reading/nodes.py` reads it, with the whole document."""
 
-    words = "a node"
+    words: str
+    form: Schema
 
-    def read(self, node: object, source: object) -> object:
+    def read(self, node: Node, source: Source) -> object:
         raise AssertionError("nodes are read by reading/nodes.py")
 
-    def schema(self) -> dict[str, object]:
-        return {"$ref": "#/$defs/node"}
+    def schema(self) -> Schema:
+        return self.form
 
 
-class _NodesShape(_NodeShape):
-    words = "a list of nodes"
-
-    def schema(self) -> dict[str, object]:
-        return {"type": "array", "minItems": 1, "items": {"$ref": "#/$defs/node"}}
-
-
-NODE: Shape = _NodeShape()
-NODES: Shape = _NodesShape()
+_NODE: Schema = {"$ref": "#/$defs/node"}
+NODE: Shape = _Nodes("a node", _NODE)
+NODES: Shape = _Nodes("a list of nodes", {"type": "array", "minItems": 1, "items": _NODE})
 TOP_KEYS = keyed(
     Key("tree", Name(), "The tree's name.", required=True, example="fetch"),
     _DESCRIPTION,

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 from bt_actions.document.language.keys import (
     ACTION_NAME,
@@ -38,11 +39,11 @@ from bt_actions.document.language.scalars import (
     NodeName,
     Place,
     Quantity,
+    Shape,
     Text,
     TypeName,
     Whole,
-)  # fmt: skip
-from bt_actions.document.language.shape import Shape
+)
 from bt_actions.document.language.shapes import (
     AnyValue,
     Key,
@@ -52,6 +53,9 @@ from bt_actions.document.language.shapes import (
     Table,
     Values,
 )  # fmt: skip
+
+if TYPE_CHECKING:
+    from bt_actions.messages.interfaces import Kind as InterfaceKind
 
 _MESSAGE = frozenset({"message"})
 _RUN = frozenset({"result", "outputs"})
@@ -67,8 +71,31 @@ class Group(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class Interface:
+    """What a kind talks over: `name` is the key that names the server or the topic.
+
+    `fields` is the key for the fields of what is sent, which are those of the part `sent` of the
+    interface; `root` is what expressions call the part `received`.
+    """
+
+    kind: InterfaceKind
+    name: str
+    fields: str = ""
+    sent: str = ""
+    root: str = ""
+    received: str = ""
+
+    def part(self, cls: Any, name: str) -> Any:
+        """The part of an interface's class; a message is its own."""
+        return getattr(cls, name) if name else cls
+
+
+@dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of node. `value` is the form of what stands behind the kind's own key."""
+    """A kind of node. `value` is the form of what stands behind the kind's own key.
+
+    `reads` is the key whose value is computed before anything is done; the node fails without it.
+    """
 
     name: str
     group: Group
@@ -76,6 +103,8 @@ class Kind:
     doc: str
     keys: Mapping[str, Key]
     example: str
+    reads: str
+    interface: Interface | None = None
 
     @property
     def named_by_value(self) -> bool:
@@ -111,16 +140,27 @@ _MEMORY = Key(
 
 
 def _composite(name: str, doc: str, example: str, *keys: Key) -> Kind:
-    return Kind(name, Group.COMPOSITE, NodeName(), doc, keyed(_CHILDREN_KEY, *keys), example)
+    return Kind(name, Group.COMPOSITE, NodeName(), doc, keyed(_CHILDREN_KEY, *keys), example, name)
 
 
 def _decorator(name: str, doc: str, example: str, *keys: Key) -> Kind:
-    return Kind(name, Group.DECORATOR, NodeName(), doc, keyed(_CHILD_KEY, *keys), example)
+    reads = keys[0].name if keys else name
+    return Kind(name, Group.DECORATOR, NodeName(), doc, keyed(_CHILD_KEY, *keys), example, reads)
 
 
-def _leaf(name: str, value: Shape, doc: str, example: str, *keys: Key) -> Kind:
-    named = isinstance(value, NodeName)
-    return Kind(name, Group.LEAF, value, doc, keyed(*keys, *(() if named else (_NAME,))), example)
+def _leaf(
+    name: str,
+    value: Shape,
+    doc: str,
+    example: str,
+    *keys: Key,
+    reads: str | None = None,
+    interface: Interface | None = None,
+) -> Kind:
+    all_keys = keyed(*keys, *(() if isinstance(value, NodeName) else (_NAME,)))
+    if reads is None:
+        reads = interface.fields if interface is not None else name
+    return Kind(name, Group.LEAF, value, doc, all_keys, example, reads, interface)
 
 
 def _all() -> Iterable[Kind]:
@@ -146,7 +186,7 @@ def _all() -> Iterable[Kind]:
         "retry",
         "Ticks its child again when it has failed.",
         "retry: Until it holds\nattempts: 3\nbackoff: 500 ms\nchild:\n  success: Grasp",
-        Key("attempts", Whole(1, values=True), "All tries.", default="without limit"),
+        Key("attempts", Whole(1, values=True), "All tries.", default="without limit", example="3"),
         Key("backoff", Duration(zero=True), "The pause before the second try.", default="0 s"),
         Key("factor", Quantity(1.0), "Each pause is this much longer.", default="2"),
         Key("max_backoff", Duration(zero=True), "The longest pause.", default="60 s"),
@@ -155,21 +195,16 @@ def _all() -> Iterable[Kind]:
         "repeat",
         "Ticks its child again when it has succeeded; fails as soon as it fails.",
         "repeat: Three rounds\ntimes: 3\nchild:\n  success: Patrol",
-        Key("times", Whole(0, values=True), "All rounds.", default="for ever"),
+        Key("times", Whole(0, values=True), "All rounds.", default="for ever", example="3"),
     )
     yield _decorator(
         "timeout",
         "Stops its child after some time, and fails when what it stopped has ended, or did not end "
         "within its own 'cancel'.",
         "timeout: Ten seconds at most\nafter: 10 s\nchild:\n  success: Search",
-        Key(
-            "after",
-            Duration(values=True),
-            "How long the child may take.",
-            required=True,
-            example="10 s",
-        ),
-    )
+        Key("after", Duration(values=True), "How long the child may take.", required=True,
+            example="10 s"),
+    )  # fmt: skip
     yield _decorator(
         "invert", "Succeeds when its child fails, and fails when it succeeds.",
         "invert: Nobody there\nchild:\n  failure: Somebody",
@@ -206,6 +241,7 @@ def _all() -> Iterable[Kind]:
         "fails when it is not.",
         keyed(_CHILD_KEY, _NAME),
         "while: $level > 0.2\nchild:\n  success: Work",
+        "while",
     )
     yield _leaf(
         "action",
@@ -216,6 +252,7 @@ def _all() -> Iterable[Kind]:
         ACTION_TYPE,
         ACTION_NAME,
         *DOING,
+        interface=Interface("action", "server", "goal", "Goal", "result", "Result"),
     )
     yield _leaf(
         "run_tree",
@@ -234,6 +271,8 @@ def _all() -> Iterable[Kind]:
         Key("expect", Condition(_RUN), "What must hold of `result`, or of `outputs`."),
         Key("save", Table(Place(_RUN)), "Names to keep parts of the outputs under."),
         *DOING[-2:],
+        reads="inputs",
+        interface=Interface("action", "server", root="result", received="Result"),
     )  # fmt: skip
     yield _leaf(
         "service",
@@ -241,27 +280,18 @@ def _all() -> Iterable[Kind]:
         "Calls a service.",
         "service: Switch the light on\ntype: std_srvs/srv/SetBool\nserver: light\n"
         "request: {data: true}\nexpect: result.success",
-        Key(
-            "type",
-            TypeName("srv"),
-            "The service's type.",
-            required=True,
-            example="std_srvs/srv/SetBool",
-        ),
-        Key(
-            "server",
-            RosName("the name of a service"),
-            "The service.",
-            required=True,
-            example="light",
-        ),
+        Key("type", TypeName("srv"), "The service's type.", required=True,
+            example="std_srvs/srv/SetBool"),
+        Key("server", RosName("the name of a service"), "The service.", required=True,
+            example="light"),
         Key("request", Values(), "The fields of the request."),
         Key("timeout", SERVICE_TIMEOUT, "How long to wait; a bare duration is the answer's."),
         Key("retry", SERVICE_RETRY, "How often to try; a bare number is the attempts."),
         Key("expect", Condition(RESULT), "What the answer must be."),
         Key("save", Table(Place(RESULT)), "Names to keep parts of the answer under."),
         Key("namespace", NAMESPACE, "Put before a relative name."),
-    )
+        interface=Interface("srv", "server", "request", "Request", "result", "Response"),
+    )  # fmt: skip
     yield _leaf(
         "publish",
         TOPIC_NAME,
@@ -270,21 +300,14 @@ def _all() -> Iterable[Kind]:
         "publish: lamp\ntype: std_msgs/msg/Bool\nmessage: {data: true}",
         MESSAGE_TYPE,
         Key("message", Values(), "The fields of the message."),
-        Key(
-            "subscribers",
-            Whole(1),
-            "So many must listen before it publishes.",
-            default="whoever is there",
-        ),
-        Key(
-            "timeout",
-            Duration(or_none=True),
-            "After which it fails where fewer listen; not while a process is new.",
-            default="none",
-        ),
+        Key("subscribers", Whole(1), "So many must listen before it publishes.",
+            default="whoever is there"),
+        Key("timeout", Duration(or_none=True), default="none",
+            doc="After which it fails where fewer listen; not while a process is new."),
         Key("qos", QOS, "How it is published.", default="default"),
         Key("namespace", NAMESPACE, "Put before a relative name."),
-    )
+        interface=Interface("msg", "publish", "message"),
+    )  # fmt: skip
     yield _leaf(
         "wait_for_message",
         NodeName(),
@@ -298,6 +321,7 @@ def _all() -> Iterable[Kind]:
         Key("save", Table(Place(_MESSAGE)), "Names to keep parts of the message under."),
         Key("qos", QOS, "How the topic is subscribed to.", default="default"),
         Key("namespace", NAMESPACE, "Put before a relative name."),
+        interface=Interface("msg", "topic", root="message"),
     )
     yield _leaf(
         "wait", Duration(zero=True, values=True), "Succeeds after some time.", "wait: 500 ms"
@@ -320,13 +344,10 @@ def _all() -> Iterable[Kind]:
         Text(values=True),
         "Writes a line to the log. It never fails: `(no value)` stands for what has none.",
         "log: The level is $(level)\nlevel: warn",
-        Key(
-            "level",
-            Choice(("debug", "info", "warn", "error", "fatal")),
-            "How grave it is.",
-            default="info",
-        ),
-    )
+        Key("level", Choice(("debug", "info", "warn", "error", "fatal")), "How grave it is.",
+            default="info"),
+        reads="",  # it never fails
+    )  # fmt: skip
     yield _leaf(
         "python",
         Text("a class, such as package.module.Class, as a text"),
@@ -348,6 +369,7 @@ def _all() -> Iterable[Kind]:
         Key("with", Values(), "Values for the tree's inputs."),
         Key("save", Table(Name()), "Names here for the tree's outputs."),
         Key("namespace", NAMESPACE, "Put before all relative names of the tree."),
+        reads="with",
     )
     for name, doc in (
         ("success", "Succeeds at once."),

@@ -9,9 +9,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from bt_actions.document.language.shape import Schema, wrong_form
+from bt_actions.document.language.scalars import Schema, wrong_form
 from bt_actions.document.language.values import BAD
-from bt_actions.document.yaml.cut import warn_cut
+from bt_actions.document.yaml.mistaken import warn_cut
 from bt_actions.document.yaml.nodes import Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source
 

@@ -1,6 +1,7 @@
 """The forms of single values: texts, names, numbers, durations, choices, expressions, type names.
 
-Each reports what is wrong to the source and then gives BAD; it knows nothing of the rest.
+Each reports what is wrong to the source and then gives BAD; it knows nothing of the rest. What all
+forms have in common stands first: the protocol, and how wrong forms are reported.
 """
 
 from __future__ import annotations
@@ -8,22 +9,18 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 from bt_actions.document.findings.elsewhere import notation_here
-from bt_actions.document.language.bare import warn_bare_duration
-from bt_actions.document.language.shape import (
-    Schema,
-    is_computed,
-    or_variable,
-    read_computed,
-    words_for,
-    wrong_form,
-)
 from bt_actions.document.language.types import meant_type
 from bt_actions.document.language.values import BAD, Computed, read_expression, read_value
-from bt_actions.document.yaml.cut import warn_cut, warn_quotes
-from bt_actions.document.yaml.nodes import NULLS, Node, Scalar, span_of
+from bt_actions.document.yaml.mistaken import (
+    report_braces,
+    warn_bare_duration,
+    warn_cut,
+    warn_quotes,
+)
+from bt_actions.document.yaml.nodes import NULLS, Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source, spoken
 from bt_actions.utilities.suggest import did_you_mean
 from bt_actions.utilities.units import DURATION_UNITS, parse_duration
@@ -33,6 +30,78 @@ _MARKED = re.compile(r"\$(?:[({]+\s*)?[A-Za-z_]")
 """A variable as a text or an expression holds it, or as other tools write one."""
 GREATEST = sys.float_info.max
 _NAME_LIMIT = 200
+Schema = dict[str, object]
+_ALONE = re.compile(r"\$\(\s*([^()$]*?)\s*\)")
+
+
+class Shape(Protocol):
+    """A form of a value."""
+
+    @property
+    def words(self) -> str:
+        """What is needed, as a message and the reference say it: ``a duration, such as 5 s``."""
+
+    def read(self, node: Node, source: Source) -> object:
+        """The value, or BAD after reporting what is wrong."""
+
+    def schema(self) -> Schema:
+        """JSON Schema for it."""
+
+
+def words_for(node: Node) -> str:
+    """What a node is, as a message says it."""
+    if isinstance(node, Mapping):
+        return "a mapping"
+    if isinstance(node, Listing):
+        return "a list"
+    assert isinstance(node, Scalar)
+    value = node.value
+    if value is None:
+        return "nothing"
+    if isinstance(value, str):
+        return repr(value) if len(value) <= 40 else f"{value[:37]!r}..."
+    return node.text if len(node.text) <= 40 else f"{node.text[:37]}..."
+
+
+def wrong_form(shape: Shape, node: Node, source: Source, *, hint: str | None = None) -> object:
+    """Report that a node is not of a form."""
+    if report_braces(node, source):
+        return BAD
+    if (
+        hint is None
+        and isinstance(node, Scalar)
+        and "text" in shape.words
+        and not isinstance(node.value, str)
+    ):
+        hint = f'to mean the text, write "{node.text}"' if node.text else None
+    if hint is None and isinstance(node, Scalar):
+        hint = notation_here(node.text)
+    message = f"{shape.words} is needed, not {words_for(node)}"
+    source.report("BT109", span_of(node), message, hint=hint)
+    return BAD
+
+
+def is_computed(node: Node) -> bool:
+    """Whether a node is `$name` or computed."""
+    return isinstance(node, Scalar) and node.text.startswith(("$", "= "))
+
+
+def read_computed(shape: Shape, node: Node, source: Source) -> object:
+    """What is computed in the place of a value of a form; a text with `$(name)` in it is not."""
+    value = read_value(node, source)
+    if value is BAD or isinstance(value, Computed):
+        return value
+    assert isinstance(node, Scalar)
+    alone = _ALONE.fullmatch(node.text)
+    hint = f"write '${alone[1]}'" if alone else "write '$name', or '= ' before an expression"
+    return wrong_form(shape, node, source, hint=f"$(...) stands inside a text: {hint}")
+
+
+def _or_variable(schema: Schema, values: bool) -> Schema:
+    """A schema that lets a variable stand for the value, where `values` says so."""
+    if not values:
+        return schema
+    return {"anyOf": [schema, {"type": "string", "pattern": r"^(\$[A-Za-z_]|= )"}]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,10 +221,7 @@ class Whole:
 
     least: int = 0
     values: bool = False
-
-    @property
-    def words(self) -> str:
-        return "a whole number"
+    words: str = "a whole number"
 
     def read(self, node: Node, source: Source) -> object:
         if self.values and is_computed(node):
@@ -169,7 +235,7 @@ class Whole:
         return value
 
     def schema(self) -> Schema:
-        return or_variable({"type": "integer", "minimum": self.least}, self.values)
+        return _or_variable({"type": "integer", "minimum": self.least}, self.values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,7 +306,7 @@ class Duration:
         ]
         if self.or_none:
             forms.append({"const": "none"})
-        return or_variable({"anyOf": forms}, self.values)
+        return _or_variable({"anyOf": forms}, self.values)
 
 
 @dataclass(frozen=True, slots=True)

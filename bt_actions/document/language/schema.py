@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from bt_actions.document.language.keys import ACTION_KEYS, LIBRARY_KEYS, TOP_KEYS
 from bt_actions.document.language.kinds import KINDS, Kind
-from bt_actions.document.language.shape import Schema
+from bt_actions.document.language.scalars import Schema
 from bt_actions.document.language.shapes import Key, keys_schema
 
 

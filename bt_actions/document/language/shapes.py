@@ -6,14 +6,23 @@ and then gives BAD; it knows nothing of the rest of the document.
 
 from __future__ import annotations
 
+from collections.abc import Container
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
 
 from bt_actions.document.findings.elsewhere import as_mapping, key_here
-from bt_actions.document.language.scalars import Choice, Name, Place
-from bt_actions.document.language.shape import Schema, Shape, is_computed, read_computed, wrong_form
+from bt_actions.document.language.scalars import (
+    Choice,
+    Name,
+    Place,
+    Schema,
+    Shape,
+    is_computed,
+    read_computed,
+    wrong_form,
+)
 from bt_actions.document.language.values import BAD, read_value
-from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of
+from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.utilities.suggest import did_you_mean
 
@@ -35,37 +44,29 @@ class AnyValue:
 
 @dataclass(frozen=True, slots=True)
 class Values:
-    """A mapping of fields (or names) to values, with `$name` in them."""
+    """A mapping of fields (or names) to values, with `$name` in them, or `$name` for one."""
 
     words: str = "a mapping of fields to values"
+    form: type[Node] = Mapping
 
     def read(self, node: Node, source: Source) -> object:
         if is_computed(node):
             return read_computed(self, node, source)
-        if not isinstance(node, Mapping):
-            hint = as_mapping(node.text) if isinstance(node, Scalar) else None
-            return wrong_form(self, node, source, hint=hint)
-        return read_value(node, source)
+        if isinstance(node, self.form):
+            return read_value(node, source)
+        meant = isinstance(node, Scalar) and self.form is Mapping and as_mapping(node.text)
+        return wrong_form(self, node, source, hint=meant or None)
 
     def schema(self) -> Schema:
-        return {"type": ["object", "string"]}
+        return {"type": ["object" if self.form is Mapping else "array", "string"]}
 
 
 @dataclass(frozen=True, slots=True)
-class ListValue:
+class ListValue(Values):
     """A list of any values, or `$name` for one."""
 
     words: str = "a list"
-
-    def read(self, node: Node, source: Source) -> object:
-        if is_computed(node):
-            return read_computed(self, node, source)
-        if isinstance(node, Listing):
-            return read_value(node, source)
-        return wrong_form(self, node, source)
-
-    def schema(self) -> Schema:
-        return {"type": ["array", "string"]}
+    form: type[Node] = Listing
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +75,7 @@ class ListOf:
 
     item: Shape
     single: bool = False
-
-    @property
-    def words(self) -> str:
-        return "a list"
+    words: str = "a list"
 
     def read(self, node: Node, source: Source) -> object:
         if not isinstance(node, Listing):
@@ -209,19 +207,21 @@ def read_keys(
     node: Mapping,
     keys: MappingType[str, Key],
     source: Source,
-    all_keys: MappingType[str, Key] | None = None,
+    elsewhere: Container[str] = (),
 ) -> dict[str, object]:
     """The values of a mapping's keys; unknown and missing ones are reported.
 
-    `all_keys` are those that may stand here, where some of them are read elsewhere.
+    Those that are read `elsewhere` are left out.
     """
     values: dict[str, object] = {}
     unknown = False
     for key, inner in node.pairs:
+        if key.text in elsewhere:
+            continue
         known = keys.get(key.text)
         if known is None:
             unknown = True
-            report_unknown_key(key, all_keys or keys, source)
+            report_unknown_key(key, keys, source)
             source.unread.nodes += (key, inner)
             continue
         value = values[key.text] = known.shape.read(inner, source)
@@ -229,9 +229,10 @@ def read_keys(
             source.unread.nodes.append(inner)
     if not unknown:  # a misspelt key would be reported twice
         for key_model in keys.values():
-            if key_model.required and key_model.name not in values:
-                source.report("BT108", span_of(node), f"the key {key_model.name!r} is missing",
-                              hint=key_model.hint)  # fmt: skip
+            name = key_model.name
+            if key_model.required and name not in values and name not in elsewhere:
+                at = start_of(node) if elsewhere else span_of(node)
+                source.report("BT108", at, f"the key {name!r} is missing", hint=key_model.hint)
                 source.unread.nodes.append(node.pairs[0][0] if node.pairs else node)
     return values
 

@@ -75,8 +75,7 @@ def parse_type(text: str, *, types: bool = True) -> FieldType | None:
     match = _SYNTAX.fullmatch(text)
     listed = "[" in text
     if match is None or listed != (match[5] is not None) or (match[2] and match[1] != "string"):
-        near = _instead(text) or _installed(text, types)
-        raise TypeNameError(f"{text!r} is no type{near}")
+        raise TypeNameError(f"{text!r} is no type{_instead(text, types)}")
     item = _item(match[1], int(match[2]) if match[2] else None, types)
     if item is None or not listed:
         return item
@@ -90,7 +89,7 @@ def _item(name: str, limit: int | None, types: bool) -> FieldType | None:
     if name in PLAIN_TYPES:
         return Scalar(name, limit)
     if "/" not in name:
-        near = _instead(name) or did_you_mean(name, PLAIN_TYPES) or _installed(name, types)
+        near = _instead(name, types, did_you_mean(name, PLAIN_TYPES))
         known = near or f"; there is {', '.join(PLAIN_TYPES)}, and package/msg/Name"
         raise TypeNameError(f"{name!r} is no type{known}")
     if not types:
@@ -98,14 +97,12 @@ def _item(name: str, limit: int | None, types: bool) -> FieldType | None:
     return Message(interface_of(name, "msg"))
 
 
-def _instead(text: str) -> str:
+def _instead(text: str, types: bool, near: str = "") -> str:
+    """What to write, for a word of elsewhere or, where nothing is `near`, an installed type."""
     here = type_here(text)
-    return f": {here}" if here else ""
-
-
-def _installed(text: str, types: bool) -> str:
-    meant = meant_type(text, "msg") if types else None
-    return f": {meant}" if meant else ""
+    if here is None and not near and types:
+        here = meant_type(text, "msg")
+    return f": {here}" if here else near
 
 
 def meant_type(text: str, kind: Kind) -> str | None:

@@ -2,25 +2,27 @@
 
 A scalar that is just `$name` keeps its type; `= $a + 1` computes; `$(name)` stands inside a text;
 `$$` is a dollar sign. Nothing is evaluated here.
+
+A tree can double a value each time round (`set: {x: [$x, $x]}`). In memory both halves are one, and
+so nothing is noticed before the value is compared or made a text, which then takes for ever: hence
+the bounds. Messages and arrays are not looked into: they are as large as ROS has made them.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
 from bt_actions.document.findings import DocumentError, Span
 from bt_actions.document.findings.elsewhere import notation_here
-from bt_actions.document.language.bounds import MAX_ITEMS, refuse_large
-from bt_actions.document.yaml.braces import report_braces
 from bt_actions.document.yaml.compose import compose
-from bt_actions.document.yaml.cut import cut_hint, warn_cut, warn_quotes
-from bt_actions.document.yaml.inner import inner_span
+from bt_actions.document.yaml.mistaken import cut_hint, report_braces, warn_cut, warn_quotes
 from bt_actions.document.yaml.nodes import (
     Listing,
     Mapping,
@@ -31,11 +33,19 @@ from bt_actions.document.yaml.nodes import (
     span_of,
 )
 from bt_actions.document.yaml.source import SUFFIXES, Source, read_source
+from bt_actions.document.yaml.written import inner_span
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.expressions.values import MAX_ITEMS as MAX_TEXT
 from bt_actions.utilities.plain_data import numbers_only
 
+MAX_ITEMS = 1_000_000
+"""Numbers, texts, lists and mappings in one value, each counted as often as it can be reached."""
+MAX_CHARACTERS = 10_000_000
+"""Of all texts in one value."""
+MAX_LEVELS = 100
+"""Lists and mappings inside each other."""
+_END = object()
 Lookup = Callable[[str], object]
 
 
@@ -83,6 +93,36 @@ class Interpolated:
             if left < 0:
                 raise ExpressionError(_TOO_LONG)
         return "".join(texts)
+
+
+def refuse_large(value: object, *, items: int = MAX_ITEMS, characters: int = MAX_CHARACTERS) -> int:
+    """Return how many items a value has.
+
+    Raises ValueError for one that is larger, or nested deeper than `MAX_LEVELS`. Takes no more time
+    than a value of the largest size.
+    """
+    left = items
+    stack: list[Iterator[object]] = [iter((value,))]
+    while stack:
+        item = next(stack[-1], _END)
+        if item is _END:
+            stack.pop()
+            continue
+        left -= 1
+        if isinstance(item, str):
+            characters -= len(item)
+        elif isinstance(item, list | tuple):
+            if len(item) <= left and numbers_only(item):
+                left -= len(item)
+                continue
+            stack.append(iter(item))
+        elif isinstance(item, MappingType):
+            stack.append(chain.from_iterable(item.items()))
+        if left < 0 or characters < 0:
+            raise ValueError("the value is too large")
+        if len(stack) > MAX_LEVELS + 1:
+            raise ValueError(f"the value is nested deeper than {MAX_LEVELS} levels")
+    return items - left
 
 
 def spoken(value: object, variable: Lookup) -> str:

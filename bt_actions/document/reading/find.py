@@ -38,20 +38,15 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
         raise TreeNotFoundError("the name of a tree is needed, not an empty text")
     path = name_or_path if isinstance(name_or_path, Path) else Path(wanted)
     exact = path if beside is None else beside / path
-    if _is_file(exact):
+    if is_file(exact):
         return exact
-    candidates: list[Path] = []
-    if path.suffix not in _SUFFIXES and exact.name:
-        candidates += [exact.with_name(path.name + suffix) for suffix in _SUFFIXES]
+    endings = ("",) if path.suffix in _SUFFIXES else _SUFFIXES
+    candidates = [exact.with_name(path.name + ending) for ending in endings if exact.name]
     is_name = len(path.parts) == 1 and not wanted.startswith(".")
-    if is_name and path.suffix in _SUFFIXES:
-        candidates += [folder / path for folder in tree_folders()]
-    elif is_name:
-        candidates += [
-            folder / (wanted + suffix) for folder in tree_folders() for suffix in _SUFFIXES
-        ]
+    for folder in tree_folders() if is_name else ():
+        candidates += [folder / (path.name + ending) for ending in endings]
     for candidate in candidates:
-        if _is_file(candidate):
+        if is_file(candidate):
             return candidate
     if _is_there(exact):
         return exact  # whoever reads it will say what it is
@@ -78,10 +73,8 @@ def tree_folder(place: str | os.PathLike[str]) -> Path:
     wanted = os.fspath(place)
     if not wanted.startswith("package://"):
         return Path(wanted)
-    package, _, inner = wanted.removeprefix("package://").partition("/")
-    for prefix in _prefixes():
-        candidate = prefix / "share" / package / inner
-        if package and ".." not in Path(inner).parts and candidate.is_dir():
+    for candidate in _places(wanted):
+        if candidate.is_dir():
             return candidate
     raise TreeNotFoundError(f"there is no folder {wanted!r}: it is written package://pkg/trees")
 
@@ -98,11 +91,6 @@ def installed_trees() -> dict[str, Path]:
             if is_tree_file(file):
                 found.setdefault(file.stem, file)
     return found
-
-
-def is_tree_file(path: Path) -> bool:
-    """Whether a file may hold a tree, by its name."""
-    return path.suffix in _SUFFIXES and not path.name.startswith(".")
 
 
 def _prefixes() -> Iterator[Path]:
@@ -122,13 +110,21 @@ def _packages(prefix: Path) -> list[str]:
         return []
 
 
+def _places(wanted: str) -> list[Path]:
+    """Where a place in a package may lie."""
+    package, _, inner = wanted.removeprefix("package://").partition("/")
+    if not package or ".." in Path(inner).parts:
+        return []
+    return [prefix / "share" / package / inner for prefix in _prefixes()]
+
+
 def _in_package(wanted: str) -> Path:
     package, _, inner = wanted.removeprefix("package://").partition("/")
-    if not package or not inner or ".." in Path(inner).parts:
+    places = _places(wanted)
+    if not inner or not places:
         raise TreeNotFoundError(f"{wanted!r} is no place: it is written package://pkg/trees/x.yaml")
-    places = [prefix / "share" / package / inner for prefix in _prefixes()]
     for candidate in places:
-        if _is_file(candidate):
+        if is_file(candidate):
             return candidate
     _refuse_links(*places)
     near = next(filter(None, map(_beside, places)), "")
@@ -143,7 +139,8 @@ def _refuse_links(*places: Path) -> None:
                 raise TreeNotFoundError(f"{path} is {link}")
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Whether a path leads to a file, as far as it can be asked."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -181,3 +178,8 @@ def _searched(exact: Path) -> str:
     """Where a name was looked for."""
     folders = [exact.parent.absolute(), *(each for each in tree_folders() if each.is_dir())]
     return f"looked in {listing(dict.fromkeys(map(str, folders)), _MOST)}"
+
+
+def is_tree_file(path: Path) -> bool:
+    """Whether a file is one of a tree, by its name."""
+    return path.suffix in _SUFFIXES and not path.name.startswith(".")

@@ -9,12 +9,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from bt_actions.document.language.bounds import refuse_large
 from bt_actions.document.language.types import parse_type
-from bt_actions.document.language.values import names_file, read_data, read_value, resolve
-from bt_actions.document.reading.tree import Declared, Document
+from bt_actions.document.language.values import (
+    names_file,
+    read_data,
+    read_value,
+    refuse_large,
+    resolve,
+)
+from bt_actions.document.reading.tree import Document
 from bt_actions.document.yaml.compose import compose
-from bt_actions.document.yaml.nodes import Node
 from bt_actions.document.yaml.source import Source, TooManyErrors
 from bt_actions.messages.fields import Message, Scalar
 from bt_actions.utilities.suggest import did_you_mean, listing
@@ -43,7 +47,17 @@ class TreeInput:
 
 def inputs_of(document: Document) -> dict[str, TreeInput]:
     """What a tree wants to be given."""
-    return {name: _input(declared) for name, declared in document.inputs.items()}
+    return {
+        name: TreeInput(
+            name,
+            str(declared.values.get("type", "")),
+            "default" not in declared.values,
+            declared.values.get("default"),
+            str(declared.values.get("unit", "")),
+            str(declared.values.get("description", "")),
+        )
+        for name, declared in document.inputs.items()
+    }
 
 
 def check_inputs(
@@ -105,7 +119,12 @@ def parse_text(text: str) -> object:
     node = compose(source)
     if source.findings:
         raise ValueError(f"{text!r}: {source.findings[0].message}")
-    value = _plain(node) if node is not None else None
+    value: object = None
+    with contextlib.suppress(TooManyErrors):  # which are filed
+        value = None if node is None else read_value(node, source)
+    for finding in source.findings:
+        raise ValueError(f"{finding.message} ({finding.hint})" if finding.hint else finding.message)
+    value = resolve(value, lambda name: f"${name}")
     refuse_large(value)
     refuse_infinite(value)
     return value
@@ -128,31 +147,9 @@ def refuse_infinite(value: object) -> None:
             waiting.append(value.tolist())
 
 
-def _plain(node: Node) -> object:
-    source = Source("value", "")
-    value: object = None
-    with contextlib.suppress(TooManyErrors):  # which are filed
-        value = read_value(node, source)
-    for finding in source.findings:
-        raise ValueError(f"{finding.message} ({finding.hint})" if finding.hint else finding.message)
-    return resolve(value, lambda name: f"${name}")
-
-
 def _fit(document: Document, name: str, value: object, text: str, *, types: bool) -> object:
     try:
         refuse_infinite(value)
         return convert(value, text, types=types)
     except ValueError as error:
         raise InputError(f"input {name!r} of {document.name!r}: {error}") from None
-
-
-def _input(declared: Declared) -> TreeInput:
-    values = declared.values
-    return TreeInput(
-        declared.name,
-        str(values.get("type", "")),
-        "default" not in values,
-        values.get("default"),
-        str(values.get("unit", "")),
-        str(values.get("description", "")),
-    )

@@ -5,30 +5,41 @@ Reports what is wrong as `read.py` does.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping as MappingType
 from itertools import chain
 
 from bt_actions.document.findings import Place, Related
 from bt_actions.document.findings.elsewhere import key_here, kind_here
 from bt_actions.document.language.keys import ACTION_KEYS
-from bt_actions.document.language.kinds import KINDS, Group, Kind
-from bt_actions.document.language.scalars import Name
-from bt_actions.document.language.shape import words_for, wrong_form
+from bt_actions.document.language.kinds import KINDS, Group, Interface
+from bt_actions.document.language.scalars import Name, is_computed, words_for, wrong_form
 from bt_actions.document.language.shapes import (
     Key,
     Table,
     report_unknown_key,
     required_in,
 )
+from bt_actions.document.language.types import interface_of
 from bt_actions.document.language.values import BAD
-from bt_actions.document.reading.around import a_kind, around
-from bt_actions.document.reading.listed import FIELDS, fields_for
 from bt_actions.document.reading.tree import Document, TreeNode
 from bt_actions.document.reading.unread import Doubts
-from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar, span_of, start_of
+from bt_actions.document.yaml.nodes import (
+    Listing,
+    Mapping,
+    Node,
+    Scalar,
+    data_of,
+    span_of,
+    start_of,
+)
+from bt_actions.messages.as_fields import as_fields
 from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
 
+_ACTION = KINDS["action"]
 _CHILDREN = ("child", "children")
+_NEEDS = {kind.name: required_in(kind.keys) for kind in KINDS.values()}
+"""The keys that must be there."""
 NODE_KEYS = frozenset(
     {*ACTION_KEYS, *_CHILDREN, *(key for kind in KINDS.values() for key in kind.keys)}
 )
@@ -40,6 +51,8 @@ _BESIDE_TYPE = frozenset({"action", *_BESIDE_CHILD})
 _DECORATORS = {kind.name: kind.name for kind in KINDS.values() if kind.group is Group.DECORATOR}
 _DECORATORS |= {key: name for name in _DECORATORS for key in KINDS[name].keys if key != "name"}
 """Which kind a decorator's name, or a key of one, is written for."""
+_LONGEST = 40
+_SIGNS = frozenset(":,{}[]#\n")
 _IN_SEQUENCE = "put a sequence there, and the list into it: {sequence: name, children: [...]}"
 
 
@@ -103,12 +116,12 @@ class _Reader:
             source.unread.nodes.append(written)
             return None
         kind = KINDS.get(key.text)
-        node = TreeNode(kind, key, written, source)
-        if kind is None:
-            node.alias = key.text
-            self._fill(node, ACTION_KEYS, _ACTION_NAME, _ACTION_NEEDS)
+        if kind is not None:
+            node = TreeNode(kind, key, written, source)
+            self._fill(node, kind.keys)
         else:
-            self._fill(node, kind.keys, kind, _NEEDS[kind.name])
+            node = TreeNode(_ACTION, key, written, source, alias=key.text)
+            self._fill(node, ACTION_KEYS)
         return node
 
     def _typed(self, written: Mapping, said: Node) -> bool:
@@ -143,12 +156,10 @@ class _Reader:
                 said = inner
         if said is not None and self._typed(written, said):
             return None
-        if len(kinds) == 1 and kinds[0].text not in _BESIDE_CHILD:
-            return kinds[0]
-        has_child = any(key.text == "child" for key, _ in written.pairs)
-        found = [key for key in kinds if has_child or key.text not in _BESIDE_CHILD]
-        if len(found) > 1 and has_child:
-            found = [key for key in found if key.text not in _BESIDE_CHILD] or found[:1]
+        found = [key for key in kinds if key.text not in _BESIDE_CHILD]
+        beside = [key for key in kinds if key.text in _BESIDE_CHILD]
+        if not found and written.get("child") is not None:
+            found = beside[:1]
         if len(found) == 1:
             return found[0]
         if found:
@@ -156,22 +167,16 @@ class _Reader:
             place = Place(self._source.name, first.line, first.column)
             self._source.report(
                 "BT112", span_of(second),
-                f"a node is one thing: this is {a_kind(first.text)} and {a_kind(second.text)}",
+                f"a node is one thing: this is {_a_kind(first.text)} and {_a_kind(second.text)}",
                 hint=self._nested(written, first, second) or "begin a new item with '-'",
                 related=Related(place, "the first is here"),
             )  # fmt: skip
             return None
         words = [key for key, _ in written.pairs if key.text not in NODE_KEYS]
-        beside = [key for key, _ in written.pairs if key.text in _BESIDE_CHILD]
-        if (
-            len(beside) == 1
-            and not words
-            and (
-                written.get("children") is not None
-                or self._holds_nodes(written.get(beside[0].text))
-            )
-        ):
-            return beside[0]  # with what it holds in the place of 'child'
+        if len(beside) == 1 and not words:
+            has_children = written.get("children") is not None
+            if has_children or self._holds_nodes(written.get(beside[0].text)):
+                return beside[0]  # with what it holds in the place of 'child'
         self._report_no_kind(written, words)
         return None
 
@@ -180,7 +185,7 @@ class _Reader:
         for outer, inner in ((first, second), (second, first)):
             kind = KINDS.get(outer.text)
             if kind is not None and kind.group is Group.DECORATOR:
-                return around(written, outer, inner)
+                return _around(written, outer, inner)
         return None
 
     def _report_no_kind(self, written: Mapping, words: list[Scalar]) -> None:
@@ -211,12 +216,11 @@ class _Reader:
         for name in _CHILDREN:
             inner = written.get(name)
             if inner is not None:
-                self._children(TreeNode(None, Scalar(), written, self._source), name, inner)
+                self._children(TreeNode(_ACTION, Scalar(), written, self._source), name, inner)
 
-    def _fill(
-        self, node: TreeNode, keys: MappingType[str, Key], kind: Kind, needs: tuple[Key, ...]
-    ) -> None:
+    def _fill(self, node: TreeNode, keys: MappingType[str, Key]) -> None:
         source, values, written = self._source, node.values, node.written
+        kind, interface = node.kind, node.kind.interface
         unknown = False
         beside: list[tuple[Scalar, Node]] = []
         for key, inner in chain(node.node.pairs, beside):
@@ -225,7 +229,7 @@ class _Reader:
                 written[name] = inner
                 if isinstance(inner, Scalar):
                     value = kind.value.read(inner, source)
-                elif hint := self._below_name(node, inner, kind, keys, beside):
+                elif hint := self._below_name(node, inner, keys, beside):
                     value = wrong_form(kind.value, inner, source, hint=hint)
                 else:
                     value = kind.value.read(inner, source)
@@ -244,12 +248,12 @@ class _Reader:
                     self._report_unknown(node, key, keys)
                     source.unread.nodes += (key, inner)
                     if name in _CHILDREN:
-                        self._children(TreeNode(None, key, node.node, source), name, inner)
+                        self._children(TreeNode(_ACTION, key, node.node, source), name, inner)
                     continue
                 written[name] = inner
-                if name in FIELDS and isinstance(inner, Listing):
+                if isinstance(inner, Listing) and interface and name == interface.fields:
                     typed = self._actions[node.alias].node if node.alias else node.node
-                    hint = fields_for(name, inner, typed)
+                    hint = _fields_for(interface, inner, typed)
                     value = wrong_form(known.shape, inner, source, hint=hint)
                 else:
                     value = known.shape.read(inner, source)
@@ -261,10 +265,8 @@ class _Reader:
             node.name = own
         if unknown:
             return
-        missing = [
-            wanted for wanted in needs
-            if wanted.name not in written and wanted.name not in self._astray
-        ]  # fmt: skip
+        needs = _NEEDS[kind.name] if node.alias is None else ()
+        missing = [key for key in needs if key.name not in written and key.name not in self._astray]
         if missing and node.is_action and node.name in self._actions:
             said = f"{node.name!r} is an action of this tree: its name is the node's kind"
             source.report("BT108", span_of(node.key), said, hint=f"write '{node.name}: name'")
@@ -282,7 +284,6 @@ class _Reader:
         self,
         node: TreeNode,
         inner: Node,
-        kind: Kind,
         keys: MappingType[str, Key],
         beside: list[tuple[Scalar, Node]],
     ) -> str | None:
@@ -291,21 +292,22 @@ class _Reader:
         It is read on as if it stood where it belongs: keys that belong beside the word are added to
         `beside`. None, where nobody can tell what is meant.
         """
+        kind = node.kind
         if isinstance(kind.value, Table):
             return None
         write = f"write '{node.key.text}: {'name' if kind.named_by_value else '...'}'"
         held = next((name for name in _CHILDREN if name in keys), None)
-        fields = next((name for name in FIELDS if name in keys), None)
+        fields = kind.interface.fields if kind.interface is not None else ""
         if isinstance(inner, Mapping):
             names = {key.text for key, _ in inner.pairs}
             known = names & {*keys, "name"}
-            if known and (fields is None or known == names or known & {fields, "type"}):
+            if known and (not fields or known == names or known & {fields, "type"}):
                 beside += [pair for pair in inner.pairs if pair[0].text != "name"]
                 name = inner.get("name")
                 if isinstance(name, Scalar) and kind.named_by_value:
                     write = f"write '{node.key.text}: {name.text}'"
                 return f"{write}, and the keys beside it"
-            if fields is not None:
+            if fields:
                 return f"{write}, and the fields beside it, under '{fields}:'"
         if held is None or not kind.named_by_value or node.node.get(held) is not None:
             return None
@@ -335,7 +337,7 @@ class _Reader:
         else:
             hint = None
             if (near := _decorator_of(key.text, keys)) and near not in keys:
-                hint = around(node.node, key, node.key, near)
+                hint = _around(node.node, key, node.key, near)
             if key.text == "name" and "name" not in keys:
                 hint = f"the name stands behind '{node.key.text}:'"
             report_unknown_key(key, keys, self._source, hint)
@@ -370,8 +372,48 @@ def _decorator_of(word: str, keys: MappingType[str, Key]) -> str | None:
     return closest(word, (*_BESIDE_CHILD, "repeat"))
 
 
-_ACTION_NAME = KINDS["sequence"]
-"""The value of an alias is the node's name, as that of a composite is."""
-_ACTION_NEEDS = required_in(ACTION_KEYS)
-_NEEDS = {kind.name: required_in(kind.keys) for kind in KINDS.values()}
-"""The keys that must be there."""
+def _around(written: Mapping, outer: Scalar, inner: Scalar, decorator: str = "") -> str:
+    """Put a decorator around a node: `outer` and `inner` are the two keys of what was written.
+
+    `decorator` is the kind that is meant, where `outer` is one of its keys, or looks like its name.
+    """
+    decorator = decorator or outer.text
+    keys, setting = KINDS[decorator].keys, KINDS[decorator].reads
+    said = _text(written.get(decorator))
+    if said == "..." and outer.text not in keys:
+        said = _text(written.get(outer.text))
+    name = _text(written.get(inner.text))
+    parts = [f"{decorator}: {said if decorator == 'while' else name}"]
+    if setting in keys:  # how often, or how long
+        given = _text(written.get(setting))
+        if given == "..." and said[:1].isdigit():
+            given = said
+        parts.append(f"{setting}: {keys[setting].example if given == '...' else given}")
+    own = {key: _text(written.get(key)) for key in keys if key != setting}
+    parts += [f"{key}: {given}" for key, given in own.items() if key != "name" and given != "..."]
+    parts.append(f"child: {{{inner.text}: {name}, ...}}")
+    return f"{_a_kind(decorator)} goes around the node: {{{', '.join(parts)}}}"
+
+
+def _a_kind(word: str) -> str:
+    """Return ``a 'retry'``, ``an 'invert'``."""
+    return f"{'an' if word[0] in 'aeiou' else 'a'} {word!r}"
+
+
+def _text(node: Node | None) -> str:
+    """A short scalar as it is, if it can stand in braces so; dots for anything else."""
+    said = node.text if isinstance(node, Scalar) else ""
+    return said if 0 < len(said) <= _LONGEST and _SIGNS.isdisjoint(said) else "..."
+
+
+def _fields_for(interface: Interface, inner: Listing, typed: Node) -> str | None:
+    """Return a hint for a list in the place of fields; `typed` holds the interface's type."""
+    named = typed.get("type") if isinstance(typed, Mapping) else None
+    if not isinstance(named, Scalar):
+        return None
+    with contextlib.suppress(ValueError):  # TypeNameError is one
+        cls = interface_of(named.text, interface.kind)
+        data = [None if is_computed(each) else data_of(each) for each in inner.items]
+        instead = as_fields(interface.part(cls, interface.sent), data)
+        return f"write {instead}" if instead else None
+    return None

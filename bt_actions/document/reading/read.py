@@ -6,14 +6,13 @@ part that was reported stands as BAD, so that nothing is said about it twice.
 
 from __future__ import annotations
 
-from collections.abc import Container
 from collections.abc import Mapping as MappingType
 
 from bt_actions.document.findings import Span
 from bt_actions.document.findings.elsewhere import key_here
 from bt_actions.document.language.keys import DEFAULTS, LIBRARY_KEYS, TOP_KEYS
 from bt_actions.document.language.kinds import KINDS
-from bt_actions.document.language.shape import words_for
+from bt_actions.document.language.scalars import words_for
 from bt_actions.document.language.shapes import Key, read_keys
 from bt_actions.document.language.values import BAD
 from bt_actions.document.reading.nodes import NODE_KEYS
@@ -41,21 +40,21 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
         source.report("BT106", span_of(node), message, hint=hint)
         return None
     document = Document(source, node)
-    if not library and node.get("root") is None and node.get("tree") is None:
+    has_root = node.get("root") is not None
+    if not library and not has_root and node.get("tree") is None:
         library = any(node.get(name) is not None for name in ("actions", "topics", "defaults"))
-    keys = LIBRARY_KEYS if library else TOP_KEYS
-    if library and node.get("root") is not None:
-        keys = TOP_KEYS
-    if not library and node.get("root") is None and node.get("tree") is None:
-        source.report(
-            "BT106", start_of(node), "this is not a tree: the keys 'tree' and 'root' are missing"
-        )
-        return None
+        if not library:
+            message = "this is not a tree: the keys 'tree' and 'root' are missing"
+            source.report("BT106", start_of(node), message)
+            return None
+    keys = TOP_KEYS if has_root or not library else LIBRARY_KEYS
     misplaced = _misplaced(node, keys, source) if "root" in keys else []
-    rest = _without(node, {"root", *misplaced})
-    values = read_keys(rest, _but_root(keys), source, keys)
-    wanted = "root" in keys and not library and node.get("root") is None
-    if wanted and all(closest(key.text, keys) != "root" for key, _ in node.pairs):
+    values = read_keys(node, keys, source, {"root", *misplaced})
+    if (
+        not library
+        and not has_root
+        and all(closest(key.text, keys) != "root" for key, _ in node.pairs)
+    ):
         message = "the key 'root' is missing: it holds the tree's nodes"
         source.report("BT108", start_of(node), message)
     document.values = values
@@ -85,18 +84,6 @@ def _misplaced(node: Mapping, keys: MappingType[str, Key], source: Source) -> li
 
 def _of_node(name: str) -> bool:
     return name in KINDS or name in NODE_KEYS
-
-
-def _without(node: Mapping, names: Container[str]) -> Mapping:
-    copy = Mapping()
-    copy.begin = copy.end = node.begin
-    copy.flow = node.flow
-    copy.pairs = [pair for pair in node.pairs if pair[0].text not in names]
-    return copy
-
-
-def _but_root(keys: MappingType[str, Key]) -> MappingType[str, Key]:
-    return {name: key for name, key in keys.items() if name != "root"}
 
 
 def _declare(document: Document, table: str, into: dict[str, Declared]) -> None:

@@ -1,56 +1,48 @@
 """A document after reading: what was said, with the YAML node each part came from.
 
-Plain values; nothing here checks or builds.
+Plain values, and what comes of them for a node: settings, ROS names, writes. Nothing here checks or
+builds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from bt_actions.document.findings import Place
-from bt_actions.document.language.kinds import Kind
+from bt_actions.document.language.kinds import KINDS, Kind
+from bt_actions.document.language.values import Computed
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
 
 
+@dataclass(slots=True, eq=False, repr=False)
 class TreeNode:
     """A node of the tree.
 
     `values` holds what was read under each key (the kind's own key included), `written` the YAML
     node of each; `level` is how deep it is, from 1. `alias` is the action's name in this document,
-    where the node is one; `included` the tree that a subtree stands for. `is_action` tells whether
-    it sends a goal: under an action's name, with its type in place, or to a server of trees.
+    where the node's key is one; its kind is `action` then. `included` is the tree that a subtree
+    stands for. `is_action` tells whether it sends a goal, also to a server of trees.
     """
 
-    __slots__ = (
-        "alias",
-        "children",
-        "included",
-        "is_action",
-        "key",
-        "kind",
-        "level",
-        "name",
-        "node",
-        "source",
-        "values",
-        "written",
-    )
+    kind: Kind
+    key: Scalar
+    node: Mapping
+    source: Source
+    alias: str | None = None
+    name: str = ""
+    level: int = 1
+    values: dict[str, object] = field(default_factory=dict)
+    written: dict[str, Node] = field(default_factory=dict)
+    children: list[TreeNode] = field(default_factory=list)
+    included: Document | None = None
+    is_action: bool = field(init=False)
 
-    def __init__(self, kind: Kind | None, key: Scalar, node: Mapping, source: Source) -> None:
-        self.kind = kind
-        self.is_action = kind is None or kind.name in ("action", "run_tree")
-        self.level = 1
-        self.key = key
-        self.node = node
-        self.source = source
-        self.alias: str | None = None
-        self.name: str = ""
-        self.values: dict[str, object] = {}
-        self.written: dict[str, Node] = {}
-        self.children: list[TreeNode] = []
-        self.included: Document | None = None
+    def __post_init__(self) -> None:
+        self.is_action = self.kind.name in ("action", "run_tree")
 
     @property
     def place(self) -> Place:
@@ -116,6 +108,9 @@ class Document:
     """What each alias (None: no alias) has where a node says nothing; made when first asked for."""
     root: TreeNode | None = None
     imported: list[Document] = field(default_factory=list)
+    size: int = 0
+    height: int = 0
+    """How many nodes the tree has, and on how many levels, with all that it includes."""
     _nodes: tuple[TreeNode, ...] = ()
 
     @property
@@ -138,3 +133,137 @@ class Document:
         if not self._nodes and self.root is not None:
             self._nodes = tuple(self.root.walk())
         return self._nodes
+
+
+_WRITERS = {"set", "for_each", *(name for name, kind in KINDS.items() if "save" in kind.keys)}
+
+
+def text_of(values: MappingType[str, object], key: str) -> str:
+    """A text as it is, and anything else as an empty one."""
+    value = values.get(key)
+    return value if isinstance(value, str) else ""
+
+
+@lru_cache(maxsize=1024)
+def join_names(*parts: str) -> str:
+    """ROS names put together; an absolute one, and one of the node's own (~), begins anew."""
+    joined = ""
+    for part in parts:
+        trimmed = part if part == "/" else part.rstrip("/")
+        if trimmed.startswith(("/", "~")) or not joined:
+            joined = trimmed
+        elif trimmed:
+            joined = f"{joined.rstrip('/')}/{trimmed}"
+    return joined
+
+
+def merged(base: dict[str, object], over: dict[str, object]) -> dict[str, object]:
+    """Two mappings of settings as one, key by key to any depth; `over` wins."""
+    result = {**base, **over}
+    for name in base.keys() & over:
+        earlier, value = base[name], over[name]
+        if isinstance(earlier, dict) and isinstance(value, dict):
+            result[name] = merged(earlier, value)
+    return result
+
+
+def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
+    """A node's settings over its alias's over the document's defaults, key by key."""
+    return merged(shared_settings(node.alias, document), node.values)
+
+
+def shared_settings(alias: str | None, document: Document) -> dict[str, object]:
+    """What the nodes of an alias (None: of no alias) have where they say nothing."""
+    shared = document.settings.get(alias)
+    if shared is None:
+        declared = document.actions.get(alias) if alias is not None else None
+        own = declared.values if declared is not None else {}
+        shared = document.settings[alias] = merged(document.defaults, own)
+    return shared
+
+
+def server_of(settings: MappingType[str, object]) -> str:
+    """The name of an action's server; that of a server of trees where none is given."""
+    return text_of(settings, "server") or "run_tree"
+
+
+def when_of(settings: object) -> object:
+    """The condition of settings for another attempt."""
+    retry = settings.get("retry") if isinstance(settings, dict) else None
+    return retry.get("when") if isinstance(retry, dict) else None
+
+
+_Known = dict[tuple[int, str], dict[str, TreeNode]]
+
+
+def resources_below(
+    root: TreeNode, document: Document, namespace: str = "", known: _Known | None = None
+) -> dict[str, TreeNode]:
+    """What the actions of a subtree hold while they run, with the first node that does.
+
+    `known` keeps what trees that are included hold, for later calls.
+    """
+    known = {} if known is None else known
+    found: dict[str, TreeNode] = {}
+    inner = join_names(namespace, document.namespace)
+    for node in root.walk():
+        if node.included is not None and node.included.root is not None:
+            below = join_names(inner, text_of(node.values, "namespace"))
+            there = (id(node.included.root), below)
+            if there not in known:
+                known[there] = resources_below(node.included.root, node.included, below, known)
+            for name in known[there]:
+                found.setdefault(name, node)
+        elif node.is_action:
+            settings = settings_of(node, document)
+            if settings.get("busy") == "share":
+                continue
+            given = settings.get("resources")
+            names = given if isinstance(given, list) and given else [server_of(settings)]
+            for name in names:
+                full = join_names(inner, text_of(settings, "namespace"), str(name))
+                found.setdefault(full, node)
+    return found
+
+
+@dataclass(slots=True, eq=False)
+class Write:
+    """A variable that a node writes: from `value`, an expression over `root` or plain data."""
+
+    name: str
+    node: TreeNode
+    under: str
+    """The key of the node that says so; none where the action's declaration does."""
+    value: object
+    root: str | None = None
+
+    @property
+    def depends(self) -> bool:
+        """Does the type of what is written depend on those of variables?"""
+        return isinstance(self.value, Computed) and bool(self.value.expression.variables)
+
+
+def writes_of(node: TreeNode, document: Document) -> list[Write]:
+    """The variables that a node itself writes."""
+    values = node.values
+    kind, interface = node.kind.name, node.kind.interface
+    if kind not in _WRITERS:
+        return []
+    saved = values.get("save")
+    own = saved if isinstance(saved, dict) else {}
+    declared = document.actions.get(node.alias) if node.alias is not None else None
+    shared = declared.values.get("save") if declared is not None else None
+    root = interface.root if interface is not None else None
+    writes = [Write(name, node, "save", value, root) for name, value in own.items()]
+    if isinstance(shared, dict):
+        given = [pair for pair in shared.items() if pair[0] not in own]
+        writes = [Write(name, node, "", value, "result") for name, value in given] + writes
+    if kind == "set" and isinstance(table := values.get("set"), dict):
+        writes += [Write(name, node, "set", value) for name, value in table.items()]
+    elif kind == "for_each":
+        item, index = values.get("as", "item"), values.get("index")
+        if isinstance(item, str):
+            writes.append(Write(item, node, "as", values.get("in"), "item of"))
+        if isinstance(index, str):
+            writes.append(Write(index, node, "index", 0))
+    return writes

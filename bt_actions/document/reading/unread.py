@@ -8,25 +8,18 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from dataclasses import dataclass, field
+from functools import cached_property
 
 from bt_actions.document.reading.tree import Document, TreeNode
-from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar
+from bt_actions.document.yaml.nodes import Node
 from bt_actions.document.yaml.source import Source
+from bt_actions.document.yaml.written import scalars_of
 
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _NAME = re.compile(r"[A-Za-z0-9_ -]+")
 """What somebody may have written as a name, and no expression."""
 _KNOWN = ("root", "inputs", "outputs", "actions", "topics")
 """Keys at the top of a tree whose values say nothing about the settings of all actions."""
-
-
-@dataclass(slots=True)
-class _Words:
-    """The words of unread parts: those that may be declared there, and all."""
-
-    declared: set[str] = field(default_factory=set)
-    mentioned: set[str] = field(default_factory=set)
 
 
 class Doubts:
@@ -36,7 +29,6 @@ class Doubts:
         self._document = document
         self._sources = [one.source for one in document.with_imports()]
         self._parts = [source.unread for source in self._sources]
-        self._words: _Words | None = None
         self._places: dict[int, list[tuple[int, int]]] = {}
 
     @property
@@ -53,16 +45,16 @@ class Doubts:
         """Whether a name may be declared in what could not be read."""
         return any(part.names for part in self._parts) or name in self.declared
 
-    @property
+    @cached_property
     def declared(self) -> set[str]:
         """The words of what could not be read that may be names."""
-        return self._all_words().declared
+        names = (text for text in self._texts if _NAME.fullmatch(text))
+        return {word for text in names for word in (text, *_WORD.findall(text))}
 
     def mentions(self, name: str) -> bool:
         """Whether a name may stand in what could not be read, or be what an unknown one means."""
         return (
-            any(part.names or name in part.meant for part in self._parts)
-            or name in self._all_words().mentioned
+            any(part.names or name in part.meant for part in self._parts) or name in self._mentioned
         )
 
     @property
@@ -125,28 +117,12 @@ class Doubts:
         end = (node.end_line, max(node.end_column, node.column + 1))
         return bisect_left(places, end) - bisect_left(places, (node.line, node.column))
 
-    def _all_words(self) -> _Words:
-        if self._words is None:
-            self._words = _Words()
-            for part in self._parts:
-                _collect(part.nodes, self._words)
-        return self._words
+    @cached_property
+    def _mentioned(self) -> set[str]:
+        return {word for text in self._texts for word in _WORD.findall(text)}
 
-
-def _collect(nodes: list[Node], words: _Words) -> None:
-    waiting, seen = list(nodes), set()
-    while waiting:
-        node = waiting.pop()
-        if id(node) in seen:
-            continue
-        seen.add(id(node))
-        if isinstance(node, Mapping):
-            for key, value in node.pairs:
-                waiting += (key, value)
-        elif isinstance(node, Listing):
-            waiting.extend(node.items)
-        elif isinstance(node, Scalar):
-            found = _WORD.findall(node.text)
-            words.mentioned.update(found)
-            if _NAME.fullmatch(node.text):
-                words.declared.update((node.text, *found))
+    @cached_property
+    def _texts(self) -> set[str]:
+        """All that stands in what could not be read."""
+        unread = [node for part in self._parts for node in part.nodes]
+        return {scalar.text for node in unread for scalar in scalars_of(node)}

@@ -13,11 +13,10 @@ from pathlib import Path
 from bt_actions.document.findings import DocumentError, Finding, Related, Span
 from bt_actions.document.findings.elsewhere import package_here
 from bt_actions.document.language.kinds import KINDS
-from bt_actions.document.reading.find import TreeNotFoundError, find_tree
+from bt_actions.document.reading.find import TreeNotFoundError, find_tree, is_file
 from bt_actions.document.reading.nodes import read_root
 from bt_actions.document.reading.read import read_document
-from bt_actions.document.reading.settings import merged
-from bt_actions.document.reading.tree import Declared, Document, TreeNode
+from bt_actions.document.reading.tree import Declared, Document, TreeNode, merged
 from bt_actions.document.yaml.nodes import Listing, Node, span_of
 from bt_actions.document.yaml.source import SUFFIXES, Source, absolute, read_source
 
@@ -43,8 +42,6 @@ class Workspace:
             self._within = tuple(folder for both in ways for folder in both)
         self._documents: dict[tuple[Path, bool], Document | None] = {}
         self._sources: list[Source] = []
-        self._sizes: dict[int, int] = {}
-        self._heights: dict[int, int] = {}
         self._failed: dict[Path, DocumentError] = {}
         self._keys: dict[Path, Path] = {}
 
@@ -58,11 +55,11 @@ class Workspace:
         if refusal := source.refusal(path):
             source.report("BT209", Span(1, 1, 1, 2), refusal)
             raise DocumentError(source.findings)
-        return self._open_tree(source, (path,))
+        return self._open(source, (path,))
 
     def open_source(self, source: Source) -> Document | None:
         """The tree in a source that was read already (standard input, an editor's buffer)."""
-        return self._open_tree(source, () if source.path is None else (source.path,))
+        return self._open(source, () if source.path is None else (source.path,))
 
     @property
     def documents(self) -> list[Document]:
@@ -95,16 +92,19 @@ class Workspace:
                 del source.findings[findings:]
                 source.errors = errors
 
-    def _open_tree(self, source: Source, chain: tuple[Path, ...]) -> Document | None:
-        key = (chain[-1] if chain else Path(source.name), False)
+    def _open(
+        self, source: Source, chain: tuple[Path, ...], *, library: bool = False
+    ) -> Document | None:
+        key = (chain[-1] if chain else Path(source.name), library)
         if key in self._documents:
             return self._documents[key]
         self._sources.append(source)
-        document = read_document(source)
-        self._documents[key] = document
+        document = self._documents[key] = read_document(source, library=library)
         if document is None:
             return None
         self._import(document, chain)
+        if library:
+            return document
         read_root(document)
         size = height = 0
         for node in document.nodes():
@@ -114,8 +114,8 @@ class Workspace:
             if node.kind is _SUBTREE:
                 node.included = self._include(node, chain)
                 if node.included is not None:
-                    size += self._sizes.get(id(node.included), 0)
-                    below = node.level + self._heights.get(id(node.included), 0)
+                    size += node.included.size
+                    below = node.level + node.included.height
                     if below > MAX_LEVELS:
                         message = f"the tree unfolds to more than {MAX_LEVELS} levels of nodes"
                         source.report("BT105", span_of(node.key), message)
@@ -126,8 +126,7 @@ class Workspace:
                     message = f"the tree unfolds to more than {MAX_TREE_NODES:,} nodes"
                     source.report("BT105", span_of(node.key), message)
                     break
-        self._sizes[id(document)] = min(size, MAX_TREE_NODES + 1)
-        self._heights[id(document)] = height
+        document.size, document.height = min(size, MAX_TREE_NODES + 1), height
         return document
 
     def _include(self, node: TreeNode, chain: tuple[Path, ...]) -> Document | None:
@@ -135,29 +134,41 @@ class Workspace:
         if not isinstance(wanted, str):
             return None
         written = node.written["subtree"]
-        path = self._find(wanted, written, node.source)
+        included = self._named(wanted, written, node.source, chain)
+        if included is not None and included.node.get("root") is None:
+            name = included.source.path.name if included.source.path is not None else wanted
+            node.source.report("BT209", span_of(written), f"{name} holds no tree")
+            return None
+        return included
+
+    def _named(
+        self,
+        wanted: str,
+        written: Node,
+        source: Source,
+        chain: tuple[Path, ...],
+        *,
+        library: bool = False,
+    ) -> Document | None:
+        """A tree to include, or a `library` to import, by the name that a source gives it."""
+        path = self._find(wanted, written, source)
         if path is None:
             return None
         key = self._key(path)
         chain = tuple(map(self._key, chain))
+        most, what = (_MAX_FILES, "files") if library else (_MAX_CHAIN, "trees")
         if key in chain:
+            circle = "a cycle of imports" if library else "the tree includes itself"
             names = [step.name for step in chain[chain.index(key) :]] + [key.name]
-            text = f"the tree includes itself: {' -> '.join(names)}"
-            node.source.report("BT210", span_of(written), text)
+            source.report("BT210", span_of(written), f"{circle}: {' -> '.join(names)}")
             return None
-        if len(chain) >= _MAX_CHAIN:
-            text = f"more than {_MAX_CHAIN} trees inside each other"
-            node.source.report("BT105", span_of(written), text)
+        if len(chain) >= most:
+            source.report("BT105", span_of(written), f"more than {most} {what} inside each other")
             return None
-        if (key, False) in self._documents:
-            included = self._documents[key, False]
-        else:
-            source = self._read(path, written, node.source)
-            included = None if source is None else self._open_tree(source, (*chain, key))
-        if included is not None and included.node.get("root") is None:
-            node.source.report("BT209", span_of(written), f"{path.name} holds no tree")
-            return None
-        return included
+        if (key, library) in self._documents:
+            return self._documents[key, library]
+        opened = self._read(path, written, source)
+        return None if opened is None else self._open(opened, (*chain, key), library=library)
 
     def _find(self, wanted: str, written: Node, source: Source) -> Path | None:
         beside = source.path.parent if source.path is not None else None
@@ -168,7 +179,7 @@ class Workspace:
             text = f"there is no tree {wanted!r}" if here else str(error)
             source.report("BT209", span_of(written), text, hint=here or error.hint)
             return None
-        if path.suffix not in SUFFIXES and _is_file(path):
+        if path.suffix not in SUFFIXES and is_file(path):
             text = f"{path.name}: a tree names files that end in {', '.join(SUFFIXES)} only"
             source.report("BT209", span_of(written), text)
             return None
@@ -200,7 +211,7 @@ class Workspace:
         nodes = written.items if isinstance(written, Listing) else [written]
         defaults: dict[str, object] = {}
         for name, node in zip(names, nodes, strict=True):
-            library = self._library(str(name), node, document.source, chain)
+            library = self._named(str(name), node, document.source, chain, library=True)
             if library is None:
                 document.source.unread.names = True
                 continue
@@ -225,34 +236,6 @@ class Workspace:
             related=Related(there.place, "the other is here"),
         )  # fmt: skip
 
-    def _library(
-        self, name: str, node: Node, source: Source, chain: tuple[Path, ...]
-    ) -> Document | None:
-        path = self._find(name, node, source)
-        if path is None:
-            return None
-        key = self._key(path)
-        chain = tuple(map(self._key, chain))
-        if key in chain:
-            names = [step.name for step in chain[chain.index(key) :]] + [key.name]
-            source.report("BT210", span_of(node), f"a cycle of imports: {' -> '.join(names)}")
-            return None
-        if len(chain) >= _MAX_FILES:
-            text = f"more than {_MAX_FILES} files inside each other"
-            source.report("BT105", span_of(node), text)
-            return None
-        if (key, True) in self._documents:
-            return self._documents[key, True]
-        opened = self._read(path, node, source)
-        if opened is None:
-            return None
-        self._sources.append(opened)
-        library = read_document(opened, library=True)
-        self._documents[key, True] = library
-        if library is not None:
-            self._import(library, (*chain, key))
-        return library
-
     def _key(self, path: Path) -> Path:
         """The file itself, wherever links lead; looked for once it matters."""
         if path not in self._keys:
@@ -261,13 +244,6 @@ class Workspace:
             except (OSError, RuntimeError):
                 self._keys[path] = path
         return self._keys[path]
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:
-        return False
 
 
 def _shown(path: Path, source: Source) -> str:

@@ -4,6 +4,10 @@ libyaml's events are put together here rather than by PyYAML's own composer: nes
 memory stay bounded, both ends of every node are kept, and duplicate keys are seen. PyYAML's parser
 in Python is not used in its place: it is ten times as slow, and says other things about the same
 mistakes.
+
+libyaml ends a line at U+0085, U+2028 and U+2029, as YAML 1.1 had it, and refuses a character that
+JSON writes as two halves of UTF-16 (``"\\ud83d\\ude00"``). A stand-in takes the place of each such
+character: a code point that Unicode sets aside, and that no text holds. Every place stays the same.
 """
 
 from __future__ import annotations
@@ -21,7 +25,6 @@ from yaml import SequenceStartEvent as ListingStartEvent
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.yaml.nodes import Alias, Listing, Mapping, Node, Scalar, span_of
 from bt_actions.document.yaml.source import Source, TooManyErrors
-from bt_actions.document.yaml.stand_ins import replaced, restored
 from bt_actions.document.yaml.syntax import report_syntax
 
 MAX_DEPTH = 200
@@ -31,6 +34,12 @@ MAX_NODES = 2_000_000
 A tree of 100,000 nodes has about half of it."""
 _TOO_DEEP = f"nested deeper than {MAX_DEPTH} levels"
 _TOO_LARGE = f"this is, or unfolds to, more than {MAX_NODES:,} nodes"
+_SEPARATORS = {"\x85": "\ufdd0", "\u2028": "\ufdd1", "\u2029": "\ufdd2"}
+_BACKSLASH = "\ufdd3"
+_RESTORED = str.maketrans({inside: char for char, inside in _SEPARATORS.items()})
+_HALVES = r"u(d[89ab][0-9a-f]{2})%su(d[c-f][0-9a-f]{2})"
+_PAIR = re.compile(r"(?<!\\)((?:\\\\)*)\\" + _HALVES % r"\\", re.IGNORECASE)
+_PUT_AWAY = re.compile(_BACKSLASH + _HALVES % _BACKSLASH, re.IGNORECASE)
 NO_LIBYAML = (
     "trees are read with libyaml, and PyYAML is installed without it here; its wheels hold it: "
     "pip install --force-reinstall --only-binary :all: PyYAML"
@@ -76,12 +85,12 @@ class _Composer:
     def __init__(self, source: Source, *, unfold: bool = True) -> None:
         if not yaml.__with_libyaml__:
             raise ImportError(NO_LIBYAML, name="libyaml")
-        text = replaced(source.text)
+        text = _replaced(source.text)
         parser = yaml.CSafeLoader(text)
         self._source = source
         self._restores = text is not source.text
         self._events = chain(
-            starmap(parser.get_event, repeat((), MAX_NODES)), _beyond(source, parser.get_event)
+            starmap(parser.get_event, repeat((), MAX_NODES)), self._beyond(parser.get_event)
         )
         self._unfold = unfold
         self.anchored: dict[int, str] = {}
@@ -112,14 +121,20 @@ class _Composer:
         self._source.report(code, _event_span(event), message)
 
     def _give_up(self, code: str, event: Any, message: str) -> NoReturn:
-        _give_up(self._source, code, event, message)
+        self._report(code, event, message)
+        raise _GaveUp
+
+    def _beyond(self, get_event: Callable[[], Any]) -> Iterator[Any]:
+        """What comes after `MAX_NODES` events."""
+        self._give_up("BT105", get_event(), _TOO_LARGE)
+        yield
 
     def _scalar(self, event: Any) -> Scalar:
         node = Scalar()
         node.text, node.plain = event.value, not event.style
         node.begin, node.end = event.start_mark, event.end_mark
         if self._restores:
-            node.text = restored(event.value, quoted=event.style == '"')
+            node.text = _restored(event.value, quoted=event.style == '"')
         if event.tag is not None:
             node.plain = False
             if event.tag not in ("!", "tag:yaml.org,2002:str"):
@@ -271,17 +286,6 @@ _TAKES: dict[type, Callable[[_Composer, Any], Node]] = {
 }
 
 
-def _beyond(source: Source, get_event: Callable[[], Any]) -> Iterator[Any]:
-    """What comes after `MAX_NODES` events."""
-    _give_up(source, "BT105", get_event(), _TOO_LARGE)
-    yield
-
-
-def _give_up(source: Source, code: str, event: Any, message: str) -> NoReturn:
-    source.report(code, _event_span(event), message)
-    raise _GaveUp
-
-
 def _braced(node: Node) -> str | None:
     """What to write for `{{ x }}`, where the inner braces stand as a key."""
     if not isinstance(node, Mapping) or len(node.pairs) != 1 or not node.flow:
@@ -295,3 +299,24 @@ def _braced(node: Node) -> str | None:
 def _event_span(event: Any) -> Span:
     start, end = event.start_mark, event.end_mark
     return Span(start.line + 1, start.column + 1, end.line + 1, end.column + 1)
+
+
+def _replaced(text: str) -> str:
+    """Return a text with the stand-ins in it; the text itself where it needs none."""
+    if "\\u" in text:
+        text = _PAIR.sub(rf"\1{_BACKSLASH}u\2{_BACKSLASH}u\3", text)
+    if not text.isascii():
+        for char, inside in _SEPARATORS.items():
+            text = text.replace(char, inside)
+    return text
+
+
+def _restored(text: str, *, quoted: bool) -> str:
+    """Return the text of a scalar without stand-ins; only in double quotes a backslash escapes."""
+    if quoted:
+        text = _PUT_AWAY.sub(_joined, text)
+    return text.translate(_RESTORED).replace(_BACKSLASH, "\\")
+
+
+def _joined(pair: re.Match[str]) -> str:
+    return bytes.fromhex(pair[1] + pair[2]).decode("utf-16-be")

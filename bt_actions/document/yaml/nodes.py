@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 
 from yaml import Mark
 
@@ -93,6 +94,23 @@ class Alias(Node):
 
     __slots__ = ("name",)
     name: str
+
+
+def walk(root: Node) -> Iterator[Node]:
+    """A node and all that is in it, keys too; what an alias repeats comes once."""
+    stack, seen = [root], set[int]()
+    while stack:
+        node = stack.pop()
+        if id(node) in seen:
+            continue
+        yield node
+        if isinstance(node, Listing):
+            seen.add(id(node))
+            stack.extend(node.items)
+        elif isinstance(node, Mapping):
+            seen.add(id(node))
+            for pair in node.pairs:
+                stack.extend(pair)
 
 
 def span_of(node: Node) -> Span:

@@ -83,7 +83,7 @@ class Source:
     settled: set[Span] = field(default_factory=set)
     """Scalars about which enough was said."""
     decoded: tuple[Node, list[Char]] | None = None
-    """The scalar that inner.py was last asked about, and where its characters are written."""
+    """The scalar that written.py was last asked about, and where its characters are written."""
     within: tuple[Path, ...] | None = None
     """The folders in which every file must lie that it names; None: anywhere."""
     files: dict[Path, object] = field(default_factory=dict)

@@ -12,7 +12,6 @@ import yaml
 
 from bt_actions.document.findings import Place, Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
-from bt_actions.document.yaml.indentation import column_hint
 from bt_actions.document.yaml.source import Source
 
 _OPENS = re.compile("flow mapping|flow sequence|quoted scalar")
@@ -25,6 +24,8 @@ _ELEMENT = re.compile(r"(\$\w[\w.]*|\w+\.[\w.]+)\[(\d+)\]")
 _SHELL = re.compile(r"\$\{[^{}]*\}")
 _BRACED = re.compile(r"\{ *([A-Za-z_]\w*) *\} *$")
 _UNSPACED = re.compile(r" *(?:- +)*([A-Za-z_]\w*):([^ \t:#/][^:#]*)$")
+_DASH = re.compile(r"-( +|$)")
+_KEY = re.compile(r"""["']?([\w<][^:'"]{0,40})["']?\s*:(?:\s|$)""")
 _QUOTES = {
     "'": "inside ' ' a quote is written twice; or put the text in \" \"",
     '"': 'inside " " a quote is written \\"; or put the text in \' \'',
@@ -83,7 +84,7 @@ def _explain(source: Source, problem: str, line: int, column: int) -> _Said:
             return _Said(span, "this cannot stand behind what is before it", "put it in quotes")
         return _Said(
             span, f"this lines up with nothing above: it begins in column {column}",
-            column_hint(source, line) or "check the indentation",
+            _column_hint(source, line) or "check the indentation",
         )  # fmt: skip
     if "unexpected end of stream" in problem:
         return _Said(span, "the quote that was opened is never closed")
@@ -102,7 +103,7 @@ def _second_colon(source: Source, text: str, span: Span) -> _Said:
     unspaced = _UNSPACED.match(source.lines[above - 1])
     if unspaced is None:
         message = "this line goes on with the text above it, where no ':' can stand"
-        return _Said(span, message, column_hint(source, span.line) or "check the indentation")
+        return _Said(span, message, _column_hint(source, span.line) or "check the indentation")
     key, rest = unspaced[1], unspaced[2].rstrip()
     column = unspaced.end(1) + 1
     span = Span(above, column, above, column + 1)
@@ -154,3 +155,54 @@ def _behind(problem: str, text: str, span: Span) -> _Said | None:
         hint = f"a text that begins with '{begin}' needs quotes"
         return _Said(span, f"nothing can stand behind the '{last}' on its line", hint)
     return None
+
+
+class _Open(NamedTuple):
+    """A key, or the dash of an item (without a name), that a line may line up with."""
+
+    column: int
+    line: int
+    name: str = ""
+
+
+def _column_hint(source: Source, line: int) -> str | None:
+    """Say where a line should begin: ``begin it in column 7, as the item in line 5 does``.
+
+    Goes by the lines alone, since what is no YAML has no nodes: each key and each dash above is
+    open until a line begins further to the left.
+    """
+    text = source.line(line) or ""
+    column = _indent(text) + 1
+    is_item = _DASH.match(text.lstrip(" ")) is not None
+    opened = _opened_above(source, line)
+    fitting = [one for one in opened if is_item != bool(one.name) and one.column != column]
+    if not fitting:
+        return None
+    nearest = min(fitting, key=lambda one: (abs(one.column - column), -one.column))
+    what = repr(nearest.name) if nearest.name else "the item"
+    hint = f"begin it in column {nearest.column}, as {what} in line {nearest.line} does"
+    if not is_item and any(one.column == column and not one.name for one in opened):
+        return f"{hint}, or with '- ' for another item"
+    return hint
+
+
+def _opened_above(source: Source, line: int) -> list[_Open]:
+    """What is open where a line begins, from the outside to the inside."""
+    opened: list[_Open] = []
+    for number, text in enumerate(source.lines[: line - 1], 1):
+        at = _indent(text)
+        if text[at : at + 1] in ("", "#"):
+            continue
+        dash = _DASH.match(text, at)
+        while opened and opened[-1].column > at + bool(dash and opened[-1].name):
+            opened.pop()  # but for the key of a list that is indented as its key is
+        while dash := _DASH.match(text, at):
+            opened.append(_Open(at + 1, number))
+            at = dash.end()
+        if key := _KEY.match(text, at):
+            opened.append(_Open(at + 1, number, key[1]))
+    return opened
+
+
+def _indent(text: str) -> int:
+    return len(text) - len(text.lstrip(" "))

@@ -1,19 +1,38 @@
-"""The pages of the rules about hazards, as in `pages.py`."""
+"""The rules about hazards, as in `rules.py`, and what many examples begin with."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from functools import partial
 
-from bt_actions.document.findings.page import SUCCESS, Page, moving, tree
+from bt_actions.document.findings import Rule, Severity
 
-HAZARD_PAGES: Mapping[str, Page] = {
-    "BT301": Page(
+MOVE = """\
+actions:
+  move:
+    type: robot_control_interfaces/action/MoveRobot
+    server: move_robot
+    timeout: 30 s
+"""
+SUCCESS = "root: {success: Done}\n"
+
+
+def tree(body: str) -> str:
+    return "tree: example\n" + body
+
+
+def moving(body: str) -> str:
+    return tree(MOVE + body)
+
+
+_warning = partial(Rule, severity=Severity.WARNING)
+HAZARDS = (
+    _warning("BT301", "no result timeout",
         "An action without a result timeout waits for ever on a server that hangs. Where that is "
         "meant, say so: {result: none}.",
         moving("root: {move: Go}\n").replace("    timeout: 30 s\n", ""),
         moving("root: {move: Go}\n"),
     ),
-    "BT302": Page(
+    _warning("BT302", "a variable is read before anything writes it",
         "When this is reached, no path through the tree has written the variable. What an action "
         "saves is there when it has succeeded: not for the next child of a 'fallback'.",
         moving("root:\n  sequence: Work\n  children:\n    - check: $at > 1.0\n"
@@ -21,7 +40,7 @@ HAZARD_PAGES: Mapping[str, Page] = {
         moving("root:\n  sequence: Work\n  children:\n    - move: Go\n"
                "      save: {at: result.final_pose}\n    - check: $at > 1.0\n"),
     ),
-    "BT303": Page(
+    _warning("BT303", "two parallel branches need one resource",
         "Two branches of a 'parallel' need one resource: an action server, or what 'resources' "
         "names in its place. One of them waits for the other, or fails when its queue timeout "
         "passes.",
@@ -29,19 +48,19 @@ HAZARD_PAGES: Mapping[str, Page] = {
         moving("root:\n  sequence: One after the other\n  children: [{move: Left},"
                " {move: Right}]\n"),
     ),
-    "BT304": Page(
+    _warning("BT304", "a loop without a limit",
         "A retry without 'attempts' never gives up, and a tree around it never gets on.",
         tree("inputs: {ready: bool}\nroot:\n  retry: Until ready\n  child: {check: $ready}\n"),
         tree("inputs: {ready: bool}\nroot:\n  retry: Until ready\n  attempts: 5\n"
              "  child: {check: $ready}\n"),
     ),
-    "BT305": Page(
+    _warning("BT305", "a child that is never reached",
         "The child before this one always ends the composite: a 'fallback' stops at the first "
         "success, a 'sequence' at the first failure.",
         tree("root:\n  sequence: Work\n  children: [{failure: Give up}, {success: Done}]\n"),
         tree("root:\n  sequence: Work\n  children: [{success: Done}, {failure: Give up}]\n"),
     ),
-    "BT306": Page(
+    _warning("BT306", "a reactive composite starts what takes time again",
         "A composite with 'memory: false' begins with its first child at each tick. What takes "
         "time and has finished is thereby started again while a later child runs: an action is "
         "sent, a service is called, a wait begins. The later child is interrupted, for ever. A "
@@ -50,34 +69,34 @@ HAZARD_PAGES: Mapping[str, Page] = {
         moving("inputs: {ready: bool}\nroot:\n  sequence: Work\n  memory: false\n"
                "  children: [{check: $ready}, {move: Go}]\n"),
     ),
-    "BT307": Page(
+    _warning("BT307", "a timeout shorter than what it holds",
         "The node stops what it holds before the deadlines for results and answers, the waits and "
         "the retries in there can pass. What an action may take besides, for its queue, server and"
         " acceptance, is not counted.",
         moving("root:\n  timeout: Short\n  after: 5 s\n  child: {move: Go}\n"),
         moving("root:\n  timeout: Long enough\n  after: 40 s\n  child: {move: Go}\n"),
     ),
-    "BT308": Page(
+    _warning("BT308", "an input that nothing uses",
         "Nothing in the tree reads this input, so giving it does nothing.",
         tree("inputs: {speed: float64}\n" + SUCCESS),
         tree("inputs: {speed: float64}\nroot: {check: $speed > 0.0}\n"),
     ),
-    "BT309": Page(
+    _warning("BT309", "an action or a topic that nothing uses",
         "The tree declares an action or a topic that no node uses.",
         moving(SUCCESS),
         moving("root: {move: Go}\n"),
     ),
-    "BT310": Page(
+    _warning("BT310", "a variable that nothing reads",
         "A node writes a variable that nothing reads, and that is no output.",
         tree("root: {set: {count: 1}}\n"),
         tree("outputs: {count: int32}\nroot: {set: {count: 1}}\n"),
     ),
-    "BT311": Page(
+    _warning("BT311", "an output that nothing writes",
         "The tree promises an output that none of its nodes writes.",
         tree("outputs: {count: int32}\n" + SUCCESS),
         tree("outputs: {count: int32}\nroot: {set: {count: 1}}\n"),
     ),
-    "BT312": Page(
+    _warning("BT312", "a loop's item under a name that is taken",
         "A 'for_each' gives its item, or its index, the name of an input, of a topic, or of the "
         "item of a loop around it: who reads it afterwards may read the wrong one.",
         tree("inputs: {limit: float64}\nroot:\n  for_each: Limit\n  in: [1.0, 2.0]\n"
@@ -85,7 +104,7 @@ HAZARD_PAGES: Mapping[str, Page] = {
         tree("inputs: {limit: float64}\nroot:\n  for_each: Item\n  in: [1.0, 2.0]\n"
              "  as: value\n  child: {check: $limit > $value}\n"),
     ),
-    "BT313": Page(
+    _warning("BT313", "a key that not every item has",
         "The items of a list are mappings, and this key is not in every one of them; what reads it"
         " fails there. Where that is meant, ask first: 'at' in $item and $item.at > 1.",
         tree("root:\n  for_each: Stop\n  in: [{at: 1.0}, {to: 2.0}]\n"
@@ -93,7 +112,7 @@ HAZARD_PAGES: Mapping[str, Page] = {
         tree("root:\n  for_each: Stop\n  in: [{at: 1.0}, {at: 2.0}]\n"
              "  child: {check: $item.at > 0.0}\n"),
     ),
-    "BT314": Page(
+    _warning("BT314", "an inverted check of what nobody may know",
         "A check fails while nothing has come on the topic that it reads. Inverted, that is a "
         "success, although nobody knows: a door that was never heard of is not open. A 'not' in "
         "the check itself fails as long as there is no value.",
@@ -102,7 +121,7 @@ HAZARD_PAGES: Mapping[str, Page] = {
         tree("topics: {door: {topic: door_closed, type: std_msgs/msg/Bool}}\n"
              "root: {check: not $door.data}\n"),
     ),
-    "BT315": Page(
+    _warning("BT315", "a text that holds a variable's name",
         "A text holds the name of a variable as other languages mark it, or a value is nothing but"
         " such names: both stay text. The value of a variable is $name, or $(name) inside a text, "
         "and what is to be computed begins with '= '. Quotes say that a bare name is meant as "
@@ -110,20 +129,20 @@ HAZARD_PAGES: Mapping[str, Page] = {
         tree('inputs: {part: string}\nroot: {log: "Part {part}"}\n'),
         tree("inputs: {part: string}\nroot: {log: Part $(part)}\n"),
     ),
-    "BT316": Page(
+    _warning("BT316", "a timer that goes by the wall clock",
         "py_trees' own timer reads the wall clock. It goes on where a simulator is paused, jumps "
         "with a clock that is set, and in a test in virtual time it would never end. 'wait' goes "
         "by the node's clock.",
         tree("root: {python: py_trees.timers.Timer, arguments: {duration: 5.0}}\n"),
         tree("root: {wait: 5 s}\n"),
     ),
-    "BT317": Page(
+    _warning("BT317", "a long duration without a unit",
         "A bare number is seconds. From 500 on, milliseconds are as likely to be meant: other "
         "tools have them. A unit says which.",
         tree("root: {wait: 500}\n"),
         tree("root: {wait: 500 ms}\n"),
     ),
-    "BT318": Page(
+    _warning("BT318", "a large angle without a unit",
         "Roll, pitch and yaw are radians where they have no unit, and this is more than a full "
         "turn. A unit says what is meant.",
         tree("root:\n  publish: heading\n  type: geometry_msgs/msg/Quaternion\n"
@@ -131,7 +150,7 @@ HAZARD_PAGES: Mapping[str, Page] = {
         tree("root:\n  publish: heading\n  type: geometry_msgs/msg/Quaternion\n"
              "  message: {yaw: 90 deg}\n"),
     ),
-    "BT319": Page(
+    _warning("BT319", "a name that holds a variable",
         "The name of a node is fixed when the tree is loaded, and nothing is put into it: a "
         "variable in it would be shown as it is written. A 'log' can show the value.",
         tree("inputs: {part: string}\nroot:\n  sequence: Take $(part)\n"
@@ -139,7 +158,7 @@ HAZARD_PAGES: Mapping[str, Page] = {
         tree("inputs: {part: string}\nroot:\n  sequence: Take the part\n"
              "  children: [{log: Take $(part)}]\n"),
     ),
-    "BT320": Page(
+    _warning("BT320", "a branch that fails for the same missing value",
         "A later child of a 'fallback' reads the value without which an earlier child fails: while "
         "nothing has come on the topic, or nothing has written the variable, both fail, and what "
         "the later one was there for is not done. A 'wait_until' that a timeout ends fails as a "
@@ -161,24 +180,23 @@ HAZARD_PAGES: Mapping[str, Page] = {
                "        - force_success: If it is known\n"
                "          child: {set: {level: $battery.percentage}}\n        - move: Home\n"),
     ),
-    "BT321": Page(
+    _warning("BT321", "a comparison with what a field never holds",
         "The field's message fixes its range in a comment, and the number is outside: the "
         "comparison is always true, or always false. The charge of a battery is a fraction: 20 % "
-        "are 0.2. Known are the charge, the parts of a quaternion, latitude and longitude, "
-        "relative humidity, and the variances in a covariance, where the field itself is compared "
-        "with a number. A variance is never negative, and in a sensor's message -1 where nothing "
-        "is known. Another driver that has a number of its own for what it does not know, such as "
-        "-1, keeps to no range: silence the warning there.",
+        "are 0.2. Known are the charge, the parts of a quaternion, latitude and longitude, and "
+        "relative humidity, where the field itself is compared with a number. A driver that has a "
+        "number of its own for what it does not know, such as -1, keeps to no range: silence the "
+        "warning there.",
         tree("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
              "root: {check: $battery.percentage < 20}\n"),
         tree("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
              "root: {check: $battery.percentage < 0.2}\n"),
     ),
-    "BT322": Page(
+    _warning("BT322", "a text in typographic quotes",
         "YAML knows the quotes ' and \" alone. Those that chats and word processors put in their "
         "place are a part of the text, and are sent with it. Plain quotes around them say that they"
         " are meant.",
         tree("root:\n  publish: note\n  type: std_msgs/msg/String\n  message: {data: “map”}\n"),
         tree('root:\n  publish: note\n  type: std_msgs/msg/String\n  message: {data: "map"}\n'),
     ),
-}  # fmt: skip
+)  # fmt: skip
