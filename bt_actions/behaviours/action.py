@@ -20,7 +20,6 @@ from bt_actions.behaviours.places import root_of
 from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.events.kinds import AttemptEnded
-from bt_actions.events.snapshot import snapshot
 from bt_actions.events.teller import here
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
@@ -354,8 +353,13 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
 
     def _make_message(self) -> Any:
         action: Any = self.action_type
-        data = self.goal() if callable(self.goal) else self.goal
-        return fill(action.Goal, resolve(data), now=self._there()[0].stamp)
+        teller = here.get()
+        if teller is not None:
+            teller.reads_secret = False  # whatever was read of the attempt before
+        data = resolve(self.goal() if callable(self.goal) else self.goal)
+        if teller is not None and teller.reads_secret and self._handle is not None:
+            self._handle.goal.is_secret = True
+        return fill(action.Goal, data, now=self._there()[0].stamp)
 
     def _judge(self, handle: GoalHandle, backend: Backend) -> AttemptRecord:
         goal = handle.goal
@@ -390,7 +394,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
             record.outcome,
             record.reason,
             self.expected if unmet else "",
-            {text: snapshot(value) for text, value in unmet.items()},
+            {text: teller.shown(value) for text, value in unmet.items()},
             again_in,
         )
 

@@ -14,7 +14,7 @@ from py_trees.decorators import Decorator
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.connected import Timed
 from bt_actions.events.kinds import RoundBegan
-from bt_actions.events.snapshot import snapshot
+from bt_actions.events.snapshot import HIDDEN, snapshot
 from bt_actions.events.teller import here
 from bt_actions.goals.policy import Retry
 from bt_actions.utilities.plain_data import plain
@@ -195,7 +195,7 @@ class Repeat(Gate):
         self._times = times
 
     def initialise(self) -> None:
-        self._done, self._of, self._told = 0, "", -1
+        self._done, self._of, self._told, self._hides = 0, "", -1, False
         self._limit: int | None = None
         if self._times is None:
             return
@@ -216,7 +216,9 @@ class Repeat(Gate):
         if self._told != self._done:
             self._told = self._done
             if (teller := here.get()) is not None and teller.is_heard:
-                teller.tell(RoundBegan, self, self._done, self._limit, snapshot(self.item))
+                self._hides |= teller.reads_secret
+                item = HIDDEN if self._hides and self.item is not None else snapshot(self.item)
+                teller.tell(RoundBegan, self, self._done, self._limit, item)
         return None
 
     @property

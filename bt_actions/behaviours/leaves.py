@@ -12,6 +12,7 @@ from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Leaf, Limited
 from bt_actions.events.kinds import Logged
+from bt_actions.events.snapshot import HIDDEN
 from bt_actions.events.teller import here
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.text import ExpressionError
@@ -108,5 +109,6 @@ class Log(Leaf):
         else:
             self._backend.log(self._level, line)
         if (teller := here.get()) is not None:
-            teller.tell(Logged, self, self._level, line)
+            told = HIDDEN if teller.reads_secret else line
+            teller.tell(Logged, self, self._level, told)
         return Status.SUCCESS

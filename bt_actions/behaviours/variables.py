@@ -7,7 +7,7 @@ the blackboard is process-global and has no lock.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,10 +44,34 @@ def key(name: str) -> str:
     return "/" + name.lstrip("/").split(".", 1)[0]
 
 
+_secret: set[str] = set()
+"""The keys of variables whose values no event tells."""
+
+
+def hide(keys: Iterable[str]) -> None:
+    """Have the values of these keys told by no event, nor what is computed from them."""
+    _secret.update(keys)
+
+
+def unhide(keys: Iterable[str]) -> None:
+    """Forget that these keys are secret: their tree is gone."""
+    _secret.difference_update(keys)
+
+
+def value_of(key: str) -> Any:
+    """Return the value of an absolute key, and take note where that is a secret.
+
+    Raises KeyError where it has none.
+    """
+    if key in _secret and (teller := here.get()) is not None:
+        teller.reads_secret = True
+    return Blackboard.storage[key]
+
+
 def read(name: str) -> Any:
     """Return the value of a variable, or of a field of it; raises MissingVariable."""
     try:
-        value = Blackboard.storage[key(name)]
+        value = value_of(key(name))
     except KeyError:
         raise MissingVariable(f"variable {name!r} has no value") from None
     for step in name.lstrip("/").split(".")[1:]:
@@ -69,6 +93,8 @@ def write(values: Mapping[str, object]) -> None:
     """Give variables their values, by their absolute keys, and tell the run of it."""
     Blackboard.storage.update(values)
     if (teller := here.get()) is not None:
+        if teller.reads_secret:
+            hide(values)
         for name, value in values.items():
             teller.wrote(name, value)
 
@@ -95,6 +121,7 @@ class _Overhearing(ActivityStream):
             ActivityType.INITIALISED.value,
         )
         if written and (teller := here.get()) is not None:
+            teller.reads_secret |= activity_item.key in _secret
             teller.wrote(activity_item.key, activity_item.current_value)
 
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 else:
     Value = object  # wire.py asks for the hints of events
 
+HIDDEN = "•••"
+"""In place of a value that is secret, or was computed from one."""
 FIELDS = 1000
 """Values in one snapshot, those that hold others included,"""
 SIZE = 64_000

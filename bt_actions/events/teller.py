@@ -12,7 +12,7 @@ from contextvars import ContextVar
 from typing import Any, Protocol
 
 from bt_actions.events.kinds import Event, VariableWritten
-from bt_actions.events.snapshot import Value, snapshot
+from bt_actions.events.snapshot import HIDDEN, Value, snapshot
 from bt_actions.events.stream import Stream
 
 _OF_LOAD = re.compile(r"^/bt/\w+/\d+/")
@@ -33,6 +33,9 @@ class Teller:
     def __init__(self, stream: Stream, steady: Callable[[], float]) -> None:
         """`steady` gives the seconds by which the rates of events are bounded."""
         self.stream = stream
+        self.reads_secret = False
+        """Whether a secret was read since a node was last known to have done something: what is
+        written, said or sent since then is told as hidden."""
         self.numbers: dict[object, int] = {}
         """The number of each node, which all threads may look up."""
         self._steady = steady
@@ -58,10 +61,15 @@ class Teller:
     def wrote(self, key: str, value: object) -> None:
         """Take note of what a variable holds from now on; `claim` says who wrote it."""
         if self.stream.is_read:
-            self._written[_OF_LOAD.sub("", key)] = snapshot(value)
+            self._written[_OF_LOAD.sub("", key)] = self.shown(value)
+
+    def shown(self, value: object) -> Value:
+        """Return a snapshot of what a node has just computed, if that may be told."""
+        return HIDDEN if self.reads_secret else snapshot(value)
 
     def claim(self, node: object) -> None:
         """What was written since the last claim, `node` has written."""
+        self.reads_secret = False
         if not self._written and not self._waiting:
             return
         number = self.numbers.get(node)

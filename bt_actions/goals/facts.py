@@ -41,6 +41,8 @@ class Facts:
     on it."""
     untold: Collection[str] = ()
     """Its fields that say who asks, and not for what: no reason tells of them."""
+    is_secret = False
+    """Whether no reason, and no event, tells of its fields."""
     _fields_then = ""
 
     def __init__(
@@ -144,7 +146,7 @@ class Facts:
     @property
     def fields(self) -> str:
         """The fields that the goal message gives, in short: ``{distance: 12.0}``; or ""."""
-        if self.message is None:
+        if self.message is None or self.is_secret:
             return self._fields_then
         given = given_fields(self.message)
         asks = {name: given[name] for name in given if name not in self.untold}

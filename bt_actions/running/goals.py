@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from bt_actions.events import FeedbackCame, GoalChanged, ServerSeen
-from bt_actions.events.snapshot import snapshot
+from bt_actions.events.snapshot import HIDDEN, snapshot
 from bt_actions.events.teller import OFTEN, Teller, here
 from bt_actions.goals.policy import End
 from bt_actions.goals.terms import State
@@ -102,7 +102,7 @@ class RunGoals:
     def _tell(self, handle: GoalHandle, told: _Told) -> None:
         goal, values = handle.goal, {}
         if goal.state is State.SENDING and goal.message is not None:
-            values["goal"] = snapshot(goal.message)
+            values["goal"] = HIDDEN if goal.is_secret else snapshot(goal.message)
         if goal.result is not None and not told.result:
             told.result = True
             whole = {"fields": 100_000, "size": 10_000_000} if _is_whole(handle.owner) else {}

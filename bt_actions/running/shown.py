@@ -33,6 +33,8 @@ class ShownRun:
         self._begun = self._closed = False
         self._once = threading.Lock()
         for name, (each, value) in given_inputs(root).items():
+            if each.secret:  # which anybody could read, were it a parameter
+                continue
             unit = f" ({each.unit})" if each.unit else ""
             kind = parse_type(each.type)
             description = f"{each.description}{unit}".strip()

@@ -30,7 +30,7 @@ from bt_actions.events import (
     TreeFinished,
     Value,
 )
-from bt_actions.events.snapshot import snapshot
+from bt_actions.events.snapshot import HIDDEN, snapshot
 from bt_actions.events.stream import Stream
 from bt_actions.events.teller import Teller
 from bt_actions.goals.unaccounted import GoalReport
@@ -61,6 +61,8 @@ class TreeTeller(Teller):
         self._has_begun = self._overhears = False
         """Whether this run was told of, and what clients of the blackboard write is."""
         self._ros = 0.0
+        self._hidden = set[str]()
+        """Messages of nodes that had read a secret."""
         self.asked_by = "", ""
         """The id of the RunTree goal that the runs answer, and that of its caller's run."""
         super().__init__(Stream(self._moment), self._host.steady)
@@ -95,7 +97,10 @@ class TreeTeller(Teller):
             self._run_id,
             document.tree_name(root),
             self._new(),
-            {name: snapshot(value) for name, (_, value) in given.items()},
+            {
+                name: HIDDEN if each.secret else snapshot(value)
+                for name, (each, value) in given.items()
+            },
             document.sources_of(root),
             _versions(),
             *self.asked_by,
@@ -120,6 +125,10 @@ class TreeTeller(Teller):
         """Tell the status that a node has now; on the ticking thread, as its tick returns."""
         if not self.is_heard:
             return
+        message = node.feedback_message
+        if message and (self.reads_secret or message in self._hidden):
+            self._hidden.add(message)  # parents may take it over
+            message = HIDDEN
         self.claim(node)
         status, more = node.status, dict[str, object]()
         if status is Status.FAILURE:
@@ -127,7 +136,7 @@ class TreeTeller(Teller):
             more["by_itself"] = bool(getattr(node, "refused", False))
         elif status is Status.SUCCESS:
             more["warning"] = str(getattr(node, "warning", ""))
-        self.tell(NodeChanged, node, status, node.feedback_message, **more)
+        self.tell(NodeChanged, node, status, message, **more)
 
     def finished(
         self, status: Status, error: BaseException | None, unaccounted: list[GoalReport]

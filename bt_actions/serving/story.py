@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bt_actions.document import Tree
+from bt_actions.events.snapshot import HIDDEN
 from bt_actions.serving.catalog import Entry
 from bt_actions.serving.outcome import Code, Ending, RunOutcome
 from bt_actions.serving.requests import Said
@@ -18,7 +19,11 @@ _STOPPED = tuple(each.value[0] for each in Ending)
 def begins(file: str, tree: Tree, inputs: Mapping[str, object], goal_name: str) -> str:
     """Say what begins: its file, its inputs and the caller's name for it."""
     given = {each.name: each.default for each in tree.inputs.values()} | dict(inputs)
-    words = ", ".join(f"{name}={shorten(value, 60)}" for name, value in given.items())
+    hidden = {each.name for each in tree.inputs.values() if each.secret}
+    shown = {
+        name: HIDDEN if name in hidden else shorten(value, 60) for name, value in given.items()
+    }
+    words = ", ".join(f"{name}={value}" for name, value in shown.items())
     called = f", called {goal_name!r}" if goal_name else ""
     return clean(f"begins ({file}){' with ' if words else ''}{fit(words, 200)}{called}")
 

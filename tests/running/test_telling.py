@@ -26,7 +26,10 @@ from bt_actions.events import (
     RunBegan,
     ServerSeen,
     VariableWritten,
+    to_line,
 )
+from bt_actions.events.snapshot import HIDDEN
+from bt_actions.story.why import why
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
 from tests.support.trees import in_sequence
 
@@ -277,3 +280,64 @@ def test_retries_tell_their_rounds(tmp_path: Any) -> None:
     runner.run()
     assert [(e.number, e.of) for e in events_of(runner, RoundBegan)] == [(0, 3), (1, 3), (2, 3)]
     assert Retry(3).attempts == 3
+
+
+class TestSecrets:
+    TREE = """\
+tree: t
+inputs:
+  pin: {type: string, secret: true}
+  place: {type: float64, default: 2.0}
+actions:
+  move: {type: robot_control_interfaces/action/MoveRobot, server: move_robot, timeout: 9 s}
+root:
+  sequence: S
+  children:
+    - set: {code: "= $pin + '!'", open: true}
+    - log: the code is $(code)
+    - for_each: Each
+      in: [1, 2]
+      as: x
+      child:
+        subtree: inner.yaml
+        with: {word: $code}
+    - check: $pin == 'x'
+      name: Look
+    - move: To it
+      goal: {distance: $place}
+"""
+    INNER = "tree: inner\ninputs: {word: string}\nroot: {log: $word}\n"
+
+    def test_are_in_no_event_nor_is_what_is_computed_from_them(self, tmp_path: Any) -> None:
+        (tmp_path / "inner.yaml").write_text(self.INNER)
+        network = VirtualNetwork()
+        ScriptedServer(network, Move, "move_robot", Script(aborts=lambda goal: "no"))
+        root = tree(self.TREE.replace("== 'x'", "!= 'x'"), tmp_path, pin="hunter2")
+        runner = VirtualRunner(root, network)
+        runner.run()
+        lines = [to_line(event) for event in runner.events]
+        assert not [line for line in lines if "hunter2" in line]
+        assert network.log.lines, "a log of the tree's own says what it was told to"
+        (began,) = events_of(runner, RunBegan)
+        assert began.inputs == {"pin": HIDDEN, "place": 2.0}
+        written = {e.name: e.value for e in events_of(runner, VariableWritten)}
+        assert written["code"] == written["inner_1/word"] == HIDDEN
+        assert written["x"] == 2, "which comes of no secret"
+        (goal,) = [e.goal for e in events_of(runner, GoalChanged) if e.goal is not None]
+        assert goal == {"distance": 2.0}
+
+    def test_are_in_no_goal_that_is_told_and_no_reason(self, tmp_path: Any) -> None:
+        network = VirtualNetwork()
+        ScriptedServer(network, Move, "move_robot", Script(aborts=lambda goal: "no"))
+        text = (
+            "tree: t\ninputs: {far: {type: float64, secret: true}}\nroot:\n  action: To it\n"
+            "  type: robot_control_interfaces/action/MoveRobot\n  server: move_robot\n"
+            "  timeout: 9 s\n  goal: {distance: = $far + 1}\n  retry: {attempts: 2, backoff: 0 s}\n"
+        )
+        runner = VirtualRunner(tree(text, tmp_path, far=7776.0), network)
+        runner.run()
+        lines = [to_line(event) for event in runner.events]
+        assert not [line for line in lines if "7777" in line or "7776" in line]
+        goals = [e.goal for e in events_of(runner, GoalChanged) if e.goal is not None]
+        assert goals == [HIDDEN, HIDDEN]
+        assert not any("7777" in line for line in why(runner.state))

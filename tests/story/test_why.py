@@ -74,7 +74,7 @@ def test_a_night_of_forty_nodes_is_answered_in_a_few_lines() -> None:
     """docs/events.md shows it: why did it end, with which goal; what failed before, who went on."""
     network = VirtualNetwork()
     Simulation(network, faults=["move_robot:12:abort"])
-    runner = VirtualRunner(load_tree("examples/why.yaml"), network)
+    runner = VirtualRunner(load_tree("examples/night/night.yaml"), network)
     assert runner.run() is Status.FAILURE
     assert len(runner.state.nodes) == 40
     said = why(runner.state)
@@ -85,7 +85,7 @@ def test_a_night_of_forty_nodes_is_answered_in_a_few_lines() -> None:
     assert said[1].startswith(
         "  ABORTED: aborted by /move_robot; goal {distance: 0.0}; its result is"
     )
-    assert re.search(r"examples/why.yaml:\d+:\d+; passed on by Home in time \(timeout\), ", said[2])
+    assert re.search(r"examples/night/night.yaml:\d+:\d+; passed on by Home in time \(timeout\), ", said[2])
     assert said[3] == "failed before, and dealt with:"
     second = said[4]
     for part in (

@@ -29,7 +29,7 @@ from bt_actions.document.building.context import Context, Scope, plain_name, tab
 from bt_actions.document.findings import NODE
 from bt_actions.document.language.classes import ClassError, Python, make_behaviour, refusal
 from bt_actions.document.language.values import Computed, computed_in, refuse_large, spoken
-from bt_actions.document.reading.inputs import check_inputs
+from bt_actions.document.reading.inputs import check_inputs, inputs_of
 from bt_actions.document.reading.tree import (
     Declared,
     Document,
@@ -62,6 +62,7 @@ def build(
     Raises TooManyErrors.
     """
     assert document.root is not None
+    scope.hide(name for name, each in inputs_of(document).items() if each.secret)
     inner = join_names(namespace, document.namespace)
     topics = {declared.name: _topic(declared, inner) for declared in document.topics.values()}
     context = Context(document, scope, inner, types, topics, python, once)

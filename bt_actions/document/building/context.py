@@ -10,7 +10,7 @@ import ast
 import itertools
 import re
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from operator import attrgetter
@@ -20,7 +20,7 @@ from py_trees.blackboard import Blackboard, KeyMetaData
 
 from bt_actions.behaviours.reading import Formula, Names
 from bt_actions.behaviours.topics import TopicValue
-from bt_actions.behaviours.variables import write
+from bt_actions.behaviours.variables import hide, unhide, value_of, write
 from bt_actions.document.language.classes import Python
 from bt_actions.document.language.types import parse_type
 from bt_actions.document.language.values import Computed, refuse_large, resolve
@@ -71,6 +71,7 @@ class Scope:
                 break
             for key in [key for key in list(Blackboard.storage) if key.startswith(prefix)]:
                 Blackboard.unset(key)
+                unhide([key])
             for key in [key for key in list(Blackboard.metadata) if key.startswith(prefix)]:
                 Blackboard.metadata.pop(key, None)
         scope = cls(f"/bt/{_safe(tree)}/{next(loads.numbers)}")
@@ -95,7 +96,7 @@ class Scope:
 
     def read(self, name: str) -> object:
         """The value of a variable. Raises KeyError when it has none."""
-        return Blackboard.storage[self.key(name)]
+        return value_of(self.key(name))
 
     def write(self, name: str, value: object) -> None:
         """Give a variable a value."""
@@ -106,6 +107,10 @@ class Scope:
         write({self.key(name): value for name, value in values.items()})
         for name in values:
             Blackboard.metadata.setdefault(self.key(name), KeyMetaData())
+
+    def hide(self, names: Iterable[str]) -> None:
+        """Have no event tell what these variables hold."""
+        hide(map(self.key, names))
 
     def clear(self, name: str) -> None:
         """Take a variable's value away, if it has one."""

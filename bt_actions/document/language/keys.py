@@ -15,6 +15,7 @@ from bt_actions.document.language.scalars import (
     Choice,
     Condition,
     Duration,
+    Flag,
     Name,
     Place,
     Quantity,
@@ -101,6 +102,12 @@ INPUT = Record(
         Key("default", AnyValue(), "The value where none is given; without it one must be."),
         Key("unit", Text(), "For people."),
         Key("description", Text(), "For people."),
+        Key(
+            "secret",
+            Flag(),
+            "No event, log or parameter tells its value, nor what is computed from it.",
+            default="false",
+        ),
     ),
     short="type",
 )

@@ -43,6 +43,8 @@ class TreeInput:
     default: object = None
     unit: str = ""
     description: str = ""
+    secret: bool = False
+    """Whether no event, log or file tells its value."""
 
 
 def inputs_of(document: Document) -> dict[str, TreeInput]:
@@ -55,6 +57,7 @@ def inputs_of(document: Document) -> dict[str, TreeInput]:
             declared.values.get("default"),
             str(declared.values.get("unit", "")),
             str(declared.values.get("description", "")),
+            declared.values.get("secret") is True,
         )
         for name, declared in document.inputs.items()
     }
