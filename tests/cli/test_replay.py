@@ -40,8 +40,10 @@ def recorded(start_program: Callable[..., Process], tmp_path: Path) -> Callable[
     )
 
 
-@pytest.mark.parametrize("form", ["lines", "json"])
-@pytest.mark.parametrize("run", RUNS)
+@pytest.mark.parametrize(
+    ("run", "form"),
+    [*((run, "lines") for run in RUNS), *((run, "json") for run in ("failure", "unknown"))],
+)
 def test_a_run_is_the_same_from_its_events(
     recorded: Callable[..., Process], tmp_path: Path, run: str, form: str
 ) -> None:
