@@ -13,6 +13,7 @@ from typing import Any
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.variables import Var, resolve
+from bt_actions.events.teller import here
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.goals.policy import Outcome, Timeouts
 from bt_actions.messages.conversion import to_plain
@@ -61,7 +62,13 @@ class RunTree(ActionBehaviour):
         def goal() -> dict[str, object]:
             which = tree() if callable(tree) else resolve(tree)
             values = inputs() if callable(inputs) else resolve(inputs or {})
-            return {"tree": which, "inputs": inputs_text(values), "goal_name": goal_name or name}
+            teller = here.get()
+            return {
+                "tree": which,
+                "inputs": inputs_text(values),
+                "goal_name": goal_name or name,
+                "caller_run": teller.run_id if teller is not None else "",
+            }
 
         if not isinstance(timeout, Timeouts):
             timeout = Timeouts(result=timeout, cancel=CANCEL)
@@ -85,7 +92,7 @@ class RunTree(ActionBehaviour):
 
     def _begin(self, backend: Backend) -> GoalHandle:
         handle = super()._begin(backend)
-        handle.goal.untold = ("goal_name",)
+        handle.goal.untold = ("goal_name", "caller_run")
         return handle
 
     def _read_result(self, result: Any) -> str:

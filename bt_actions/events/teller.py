@@ -33,6 +33,8 @@ class Teller:
     def __init__(self, stream: Stream, steady: Callable[[], float]) -> None:
         """`steady` gives the seconds by which the rates of events are bounded."""
         self.stream = stream
+        self.run_id = ""
+        """32 hexadecimal digits, another one in each run."""
         self.reads_secret = False
         """Whether a secret was read since a node was last known to have done something: what is
         written, said or sent since then is told as hidden."""
@@ -69,6 +71,8 @@ class Teller:
 
     def claim(self, node: object) -> None:
         """What was written since the last claim, `node` has written."""
+        self.run_id = ""
+        """32 hexadecimal digits, another one in each run."""
         self.reads_secret = False
         if not self._written and not self._waiting:
             return

@@ -126,6 +126,15 @@ class TreeRunner:
         return self._loop.goals.unaccounted
 
     @property
+    def asked_by(self) -> tuple[str, str]:
+        """The id of the RunTree goal that the runs answer, and that of its caller's run."""
+        return self._loop.teller.asked_by
+
+    @asked_by.setter
+    def asked_by(self, ids: tuple[str, str]) -> None:
+        self._loop.teller.asked_by = ids
+
+    @property
     def stream(self) -> Stream:
         """The events of all runs, for readers on threads of their own."""
         return self._loop.teller.stream

@@ -17,8 +17,8 @@ from bt_actions.document.language.types import parse_type
 from bt_actions.events import Event, RunBegan
 from bt_actions.story.state import State
 from bt_actions.story.why import causes
-from bt_actions.utilities.plain_text import clean, in_words
-from bt_actions.utilities.shorten import brief
+from bt_actions.story.words import begins_text
+from bt_actions.utilities.plain_text import in_words
 
 if TYPE_CHECKING:
     from bt_actions.running.runner import TreeRunner
@@ -51,11 +51,8 @@ class ShownRun:
         self._state.observe(event)
         if isinstance(event, RunBegan):
             self._begun = True
-            words = [f"{name}={brief(value)}" for name, value in event.inputs.items()]
             file = event.nodes[0].place.rsplit(":", 2)[0]
-            where = f" ({file})" if file else ""
-            what = f"{event.tree}{where} begins{' with ' if words else ''}{', '.join(words)}"
-            self._rosout.say("info", clean(brief(what)))
+            self._rosout.say("info", f"{event.tree} {begins_text(file, event.inputs)}")
 
     def close(self, *, left: bool = False, error: BaseException | None = None) -> None:
         """Say how the run has ended; `left`: without waiting for its goals. Once is enough."""

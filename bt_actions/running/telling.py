@@ -1,7 +1,4 @@
-"""Tells the events of a tree's runs: who its nodes are, what becomes of them, how it ends. No ROS.
-
-Nodes are described as values, for readers who have no tree.
-"""
+"""Tells the events of a tree: who its nodes are, what becomes of them, how a run ends. No ROS."""
 
 from __future__ import annotations
 
@@ -12,33 +9,20 @@ import traceback
 from collections.abc import Iterator
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions import document
-from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.kinds import action_of, kind
 from bt_actions.behaviours.variables import overhear, overhear_less
-from bt_actions.events import (
-    Node,
-    NodeChanged,
-    NodesAdded,
-    RunBegan,
-    TreeFinished,
-    Value,
-)
+from bt_actions.document.describing import describe
+from bt_actions.events import Node, NodeChanged, NodesAdded, RunBegan, TreeFinished
 from bt_actions.events.snapshot import HIDDEN, snapshot
 from bt_actions.events.stream import Stream
 from bt_actions.events.teller import Teller
 from bt_actions.goals.unaccounted import GoalReport
-from bt_actions.messages.fields import constants
 from bt_actions.traffic.backend import Backend
-
-PHASES = ("queue", "server", "accept", "result", "feedback", "cancel")
-
 
 _ALL = sys.maxsize
 
@@ -57,7 +41,6 @@ class TreeTeller(Teller):
     def __init__(self, tree: BehaviourTree, backend: Backend) -> None:
         self._tree, self._backend = tree, backend
         self._host = backend.traffic.host
-        self._run_id = ""
         self._has_begun = self._overhears = False
         """Whether this run was told of, and what clients of the blackboard write is."""
         self._ros = 0.0
@@ -74,7 +57,7 @@ class TreeTeller(Teller):
 
     def begin(self) -> None:
         """Take note that a run begins, which is told of when its tree is set up."""
-        self._run_id, self._has_begun = self._host.new_goal_id().hex(), False
+        self.run_id, self._has_begun = self._host.new_goal_id().hex(), False
         self._overhears = self.is_heard
         if self._overhears:
             overhear()
@@ -94,7 +77,7 @@ class TreeTeller(Teller):
         given = document.given_inputs(root)
         self.stream.add(
             RunBegan,
-            self._run_id,
+            self.run_id,
             document.tree_name(root),
             self._new(),
             {
@@ -172,55 +155,6 @@ def _in_order(root: Behaviour) -> Iterator[Behaviour]:
         node = waiting.pop()
         yield node
         waiting.extend(reversed(node.children))
-
-
-def describe(node: Behaviour, number: int, parent: int | None) -> Node:
-    """Return what is told of a node, which has this number."""
-    server, action = action_of(node) or ("", "")
-    return Node(
-        number,
-        parent,
-        node.name,
-        kind(node),
-        str(document.place_of(node) or ""),
-        server,
-        action,
-        _settings(node),
-    )
-
-
-def _settings(node: Behaviour) -> dict[str, Value]:
-    memory = getattr(node, "memory", None)
-    settings: dict[str, Value] = {} if not isinstance(memory, bool) else {"memory": memory}
-    if isinstance(node, ActionBehaviour):
-        settings["timeouts"] = {phase: getattr(node.timeouts, phase) for phase in PHASES}
-        settings["attempts"] = node.retry.attempts
-        if node.expected:
-            settings["expect"] = node.expected
-        if isinstance(node.action_type, type) and (named := _constants(node.action_type)):
-            settings["constants"] = named
-    return settings
-
-
-@lru_cache(maxsize=256)
-def _constants(action: Any) -> dict[str, Value]:
-    """The constants of goal, result and feedback, by field and number."""
-    found: dict[str, Value] = {}
-    parts = {"goal": action.Goal, "result": action.Result, "feedback": action.Feedback}
-    for name, message in parts.items():
-        fields: dict[str, Value] = {}
-        for field in message.get_fields_and_field_types():
-            start = f"{field.upper()}_"
-            named: dict[str, Value] = {
-                str(number): constant.removeprefix(start)
-                for constant, number in reversed(list(constants(message).items()))
-                if constant.startswith(start)
-            }
-            if named:
-                fields[field] = named
-        if fields:
-            found[name] = fields
-    return found
 
 
 @lru_cache(maxsize=1)

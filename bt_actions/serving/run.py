@@ -14,7 +14,7 @@ from py_trees.common import Status
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.document import Tree, tree_outputs
-from bt_actions.events import Event, NodeChanged
+from bt_actions.events import Event, NodeChanged, RunEnded, StopWanted
 from bt_actions.messages.conversion import to_plain
 from bt_actions.ros.naming import server_name
 from bt_actions.running.runner import TreeRunner
@@ -34,6 +34,7 @@ class Run:
         tree: the version that was checked; a newer one does not matter any more.
         inputs: values that were checked with it.
         node: where goals are sent from; somebody spins it.
+        asked_by: the id of the RunTree goal, and of the run whose leaf sent it.
         begins: called with the full names of the servers that it uses, before it sends a goal.
         ended: called with the outcome, on the run's own thread, when all is over.
     """
@@ -44,12 +45,13 @@ class Run:
         inputs: Mapping[str, object],
         node: Any,
         *,
+        asked_by: tuple[str, str] = ("", ""),
         begins: Callable[[set[str]], None],
         ended: Callable[[RunOutcome], None],
     ) -> None:
         self.tree = tree
         self._inputs = inputs
-        self._node = node
+        self._node, self._asked_by = node, asked_by
         self._begins, self._ended = begins, ended
         self._lock = threading.Lock()
         self._runner: TreeRunner | None = None
@@ -75,6 +77,7 @@ class Run:
         with self._lock:
             self.ending = self.ending or ending
             if self._runner is not None:
+                self._runner.stream.add(StopWanted, ending.name, ending.value[1], abandon)
                 self._runner.interrupt(abandon=abandon)
 
     def pause(self, wanted: bool) -> None:
@@ -128,6 +131,7 @@ class Run:
         self._begins({server_name(self._node, each.action_name) for each in leaves})
         status, error = Status.INVALID, None
         runner = TreeRunner(root, node=self._node)
+        runner.asked_by = self._asked_by
         runner.observe(self._note)
         try:
             with self._lock:
@@ -151,7 +155,7 @@ class Run:
                 )
             except Exception as raised:  # noqa: BLE001 - a python: node may write anything
                 status, error = Status.INVALID, raised
-        return outcome_of(
+        outcome = outcome_of(
             self._state,
             succeeded=status is Status.SUCCESS,
             ending=None if status is Status.FAILURE else self.ending,
@@ -159,6 +163,8 @@ class Run:
             outputs=outputs,
             unaccounted=[f"{each.name} on {each.server}" for each in runner.unaccounted],
         )
+        runner.stream.add(RunEnded, outcome.code, "", outcome.message, outcome.unaccounted)
+        return outcome
 
     def _note(self, event: Event) -> None:
         with self._lock:

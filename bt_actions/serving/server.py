@@ -258,6 +258,7 @@ class TreeServer:
             admitted.tree,
             admitted.inputs,
             self.node,
+            asked_by=(bytes(client.goal_id.uuid).hex(), client.request.caller_run[:ECHO]),
             ended=lambda outcome: self._ended(goal, outcome),
             begins=lambda servers: self._underway.begins(goal.id, servers),
         )

@@ -9,8 +9,8 @@ from bt_actions.events.snapshot import HIDDEN
 from bt_actions.serving.catalog import Entry
 from bt_actions.serving.outcome import Code, Ending, RunOutcome
 from bt_actions.serving.requests import Said
+from bt_actions.story.words import begins_text
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import fit, shorten
 
 SAME_NAME = "SAME_NAME"
 _STOPPED = tuple(each.value[0] for each in Ending)
@@ -19,13 +19,8 @@ _STOPPED = tuple(each.value[0] for each in Ending)
 def begins(file: str, tree: Tree, inputs: Mapping[str, object], goal_name: str) -> str:
     """Say what begins: its file, its inputs and the caller's name for it."""
     given = {each.name: each.default for each in tree.inputs.values()} | dict(inputs)
-    hidden = {each.name for each in tree.inputs.values() if each.secret}
-    shown = {
-        name: HIDDEN if name in hidden else shorten(value, 60) for name, value in given.items()
-    }
-    words = ", ".join(f"{name}={value}" for name, value in shown.items())
-    called = f", called {goal_name!r}" if goal_name else ""
-    return clean(f"begins ({file}){' with ' if words else ''}{fit(words, 200)}{called}")
+    given |= {each.name: HIDDEN for each in tree.inputs.values() if each.secret}
+    return begins_text(file, given) + clean(f", called {goal_name!r}" if goal_name else "")
 
 
 def ends(outcome: RunOutcome, seconds: float | None) -> str:

@@ -5,6 +5,8 @@ Pure functions of the state; nothing here writes anything.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from py_trees.common import Status
 
 from bt_actions.events.kinds import Moment, RunEnded
@@ -38,6 +40,12 @@ MOST = 3
 """Of many actions that are waited for, or many items of a list, how many are shown."""
 MANY = 20
 """Items of a list that is shown whole."""
+
+
+def begins_text(file: str, inputs: Mapping[str, object]) -> str:
+    """Say that a run begins: its file, and its inputs as they may be told."""
+    words = fit(", ".join(f"{name}={brief(value)}" for name, value in inputs.items()), 200)
+    return clean(f"{f'({file}) ' if file else ''}begins{' with ' if words else ''}{words}")
 
 
 def last_words(state: State, width: int = MESSAGE) -> list[str]:

@@ -9,11 +9,11 @@ from py_trees.common import Status
 from robot_control_interfaces.action import MoveRobot
 
 from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.document.describing import describe
 from bt_actions.events import Cut, Event, Moment, RunEnded
 from bt_actions.events.snapshot import snapshot
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.messages.fields import fields_in_words
-from bt_actions.running.telling import describe
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
 from bt_actions.story.table import verdict

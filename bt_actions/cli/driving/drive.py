@@ -252,7 +252,7 @@ def code_of(state: State, *, raised: bool = False, complaint: str = "") -> Exit:
     if state.unaccounted or (state.left and state.finished is None):
         return Exit.UNKNOWN
     if state.stop is not None:
-        return Exit[state.stop.who]
+        return Exit.__members__.get(state.stop.who, Exit.FAILURE)
     if state.finished is not None and state.finished.unusable:
         return Exit.BAD_INPUT
     failed = raised or state.finished is None or bool(state.finished.error) or complaint

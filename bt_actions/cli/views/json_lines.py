@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, TextIO
 
+from bt_actions.cli.views.view import View
 from bt_actions.events import (
     AttemptEnded,
     Cut,
@@ -25,17 +26,12 @@ from bt_actions.story.words import stopping_text
 from bt_actions.utilities.plain_text import as_json
 
 
-class JsonView:
+class JsonView(View):
     """One JSON object a line; the last has `"event": "finished"`."""
-
-    fileno = -1
 
     def __init__(self, state: State, out: TextIO) -> None:
         self._state = state
         self._out = out
-
-    def due(self, now: float) -> None:
-        """Nothing is written for that it lasts."""
 
     def event(self, event: Event) -> None:
         """Write `event` as an object, where it has a view here."""
@@ -92,9 +88,6 @@ class JsonView:
             case StopWanted(leaves=False):
                 self.say(stopping_text(self._state))
 
-    def frame(self, now: float) -> None:
-        """Nothing changes without an event."""
-
     def say(self, text: str) -> None:
         """Write `text` as a note."""
         self._write({"event": "note", "text": text})
@@ -137,9 +130,6 @@ class JsonView:
             "world": ended.world or None,
             "complaint": ended.complaint or None,
         }
-
-    def close(self) -> None:
-        """Nothing to give back."""
 
     def _of(self, event: Event, node: int, kind: str, **fields: object) -> None:
         """Write an event of one node."""

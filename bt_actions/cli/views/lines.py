@@ -7,6 +7,7 @@ from typing import TextIO
 from py_trees.common import Status
 
 from bt_actions.cli.views.choosing import below
+from bt_actions.cli.views.view import View
 from bt_actions.events import (
     Event,
     GoalChanged,
@@ -27,15 +28,13 @@ LASTING = 1.0
 """Seconds after which a goal that still waits, or is still being canceled, gets a line."""
 
 
-class LineView:
+class LineView(View):
     """One line a change of a node, one for a goal that is under way and one for how it ended.
 
     The lines of a goal come after the news of the tick in which it was sent. A goal that waits, is
     sent or is canceled gets a line when that lasts. What is told of a node is told again in each
     round of a loop.
     """
-
-    fileno = -1
 
     def __init__(self, state: State, out: TextIO, *, verbose: bool = False) -> None:
         """`verbose` adds a line for every other state of a goal, at once."""
@@ -67,9 +66,6 @@ class LineView:
             case TreeFinished():
                 for key in list(self._held):
                     self._release(key)
-
-    def frame(self, now: float) -> None:
-        """Nothing changes without an event but what is due."""
 
     def due(self, now: float) -> None:
         """Write what has lasted long enough."""
@@ -128,9 +124,6 @@ class LineView:
         for line in last_words(self._state):
             self._write(line)
 
-    def close(self) -> None:
-        """Nothing to give back."""
-
     def _goal_line(self, at: float, key: int, text: str) -> None:
         self._line(at, "goal", f"{' / '.join(self._state.path(key))}: {text}")
 
@@ -149,32 +142,15 @@ def _is_told(event: GoalChanged) -> bool:
     return event.state == DONE or event.end is not End.UNKNOWN
 
 
-class QuietView:
+class QuietView(View):
     """Says nothing until the end."""
-
-    fileno = -1
 
     def __init__(self, state: State, out: TextIO) -> None:
         self._state = state
         self._out = out
-
-    def due(self, now: float) -> None:
-        """Show nothing."""
-
-    def event(self, event: Event) -> None:
-        """Show nothing."""
-
-    def frame(self, now: float) -> None:
-        """Show nothing."""
-
-    def say(self, text: str) -> None:
-        """Show nothing."""
 
     def finish(self) -> None:
         """Write what went wrong, if anything did."""
         for line in troubles(self._state):
             self._out.write(f"{line}\n")
         self._out.flush()
-
-    def close(self) -> None:
-        """Nothing to give back."""

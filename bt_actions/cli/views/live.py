@@ -14,6 +14,7 @@ from rich.text import Text
 
 from bt_actions.cli.streams.stderr import CaughtStderr
 from bt_actions.cli.views.choosing import below, branches, choose, fork_of
+from bt_actions.cli.views.view import View
 from bt_actions.events import Event, NodeChanged, RoundBegan, RunBegan, StopWanted
 from bt_actions.events.kinds import NodesAdded
 from bt_actions.story.actions import ActionStory
@@ -59,7 +60,7 @@ def suits(console: Console) -> bool:
     return console.is_terminal and not console.is_dumb_terminal
 
 
-class LiveView:
+class LiveView(View):
     """Draws from the state; `finish` must be called, or the terminal keeps the drawing."""
 
     def __init__(self, state: State, console: Console) -> None:
@@ -89,9 +90,6 @@ class LiveView:
     def fileno(self) -> int:
         """What to wait for besides events: standard error's lines."""
         return self._stderr.fileno
-
-    def due(self, now: float) -> None:
-        """Nothing is let by for that it lasts."""
 
     def event(self, event: Event) -> None:
         """Take in one event; let finished work scroll by."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TextIO
 
+from bt_actions.cli.views.view import View
 from bt_actions.events import Event, GoalChanged, StopWanted
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
@@ -13,10 +14,8 @@ from bt_actions.story.words import goal_text, left_open, result_lines, stopping_
 from bt_actions.utilities.shorten import fit
 
 
-class GoalView:
+class GoalView(View):
     """One line a change of the goal; on a terminal, feedback is rewritten in place."""
-
-    fileno = -1
 
     def __init__(self, state: State, out: TextIO, *, feedback: bool) -> None:
         self._state = state
@@ -26,9 +25,6 @@ class GoalView:
         self._last_feedback = ""
         self._in_place = out.isatty() and feedback
         self._drawn = False
-
-    def due(self, now: float) -> None:
-        """Nothing is written for that it lasts."""
 
     def event(self, event: Event) -> None:
         """Write where the goal stands, when that has changed."""

@@ -1,21 +1,20 @@
 """What watches a run: told every event after the state has taken it in, on the main thread.
 
-A view only writes; it decides nothing.
+A view only writes; it decides nothing. This one shows nothing.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from bt_actions.events import Event
 
 
-class View(Protocol):
+class View:
     """What watches a run."""
 
     @property
     def fileno(self) -> int:
         """A file descriptor whose data the view passes on at its next frame, or -1."""
+        return -1
 
     def due(self, now: float) -> None:
         """Show what is shown because it has lasted until `now`, on the steady clock."""
