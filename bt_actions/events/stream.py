@@ -21,7 +21,9 @@ from bt_actions.events.kinds import (
     Logged,
     Moment,
     NodeChanged,
+    NodesAdded,
     RoundBegan,
+    RunBegan,
     VariableWritten,
 )
 
@@ -70,6 +72,8 @@ class Stream:
         self._lock = threading.Lock()
         self._readers: tuple[Reader, ...] = ()
         self._number = 0
+        self._nodes: tuple[Event, ...] = ()
+        """The RunBegan of the run that was told of last, and what was inserted since."""
         self._last: tuple[float, float, float] | None = None
 
     @property
@@ -78,13 +82,15 @@ class Stream:
         return bool(self._readers)
 
     def reader(self, poke: Callable[[], None] = lambda: None, room: int = ROOM) -> Reader:
-        """Return a reader of all events from now on.
+        """Return a reader of all events from now on, behind those that tell of the tree's nodes.
 
         `poke` is called, on the thread of an event and under the lock, where one comes to an empty
         queue; it must not wait.
         """
         reader = Reader(poke, room)
         with self._lock:
+            for event in self._nodes:
+                reader.put(event)
             self._readers = (*self._readers, reader)
         return reader
 
@@ -108,6 +114,10 @@ class Stream:
         return Moment(self._number, *now)
 
     def _give(self, event: Event) -> None:
+        if isinstance(event, RunBegan):
+            self._nodes = (event,)
+        elif isinstance(event, NodesAdded):
+            self._nodes += (event,)
         for reader in self._readers:
             reader.put(event)
 

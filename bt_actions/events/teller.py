@@ -54,9 +54,14 @@ class Teller:
 
     def tell(self, kind: Callable[..., Event], node: object, *args: Any, **fields: Any) -> None:
         """Tell an event of a node, if that is one of the tree."""
+        if not self.numbers and self.is_heard:
+            self.began()  # the first reader has come since
         number = self.numbers.get(node)
         if number is not None:
             self.stream.add(kind, number, *args, **fields)
+
+    def began(self) -> None:
+        """Tell that a run has begun, with all its nodes."""
 
     # Variables; on the ticking thread
 

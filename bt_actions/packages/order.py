@@ -81,9 +81,8 @@ def _check_uses(source: Package, sources: dict[str, Package], prefixes: Sequence
         known = built.messages if built else messages_in(package, prefixes)
         if not known and not built:
             raise PackageError(
-                f"{place}: {used} is used, and {package} is neither installed nor beside "
-                f"{source.folder.name}: give the path of its sources, too, or install it "
-                f"(`pip install ros-jazzy-{package.replace('_', '-')}`, where the index has it)"
+                f"{place}: {used} is used, and {package} is not there: give the path of its "
+                f"sources, too, or `pip install ros-jazzy-{package.replace('_', '-')}`"
             )
         if name not in known:
             has = what_it_has(name, sorted(known))

@@ -21,7 +21,7 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.places import culprit_of, path_of, root_of
-from bt_actions.events import Event, Observer, Paused
+from bt_actions.events import Observer, Paused
 from bt_actions.events.stream import Reader
 from bt_actions.messages.interfaces import TwoTypes
 from bt_actions.running.goals import RunGoals
@@ -87,10 +87,9 @@ class TickLoop:
         self._log = self._traffic.host.log
         self._ready, self._check, self._misbehaved = ready, check, misbehaved
         self.teller = TreeTeller(tree, self._backend)
-        self._observers: list[Observer] = []
-        self._slow: list[Observer] = []
-        """Those of which that was said."""
-        self._observed: Reader | None = None
+        self._observers: dict[Reader, Observer] = {}
+        self._slow = set[Reader]()
+        """Those whose observer is slow, as was said."""
         self.goals = RunGoals(
             self.teller,
             wake,
@@ -114,9 +113,7 @@ class TickLoop:
 
     def observe(self, callback: Observer) -> None:
         """Call `callback` with each event, in the step; one that raises is removed."""
-        self._observers.append(callback)
-        if self._observed is None:
-            self._observed = self.teller.stream.reader(room=sys.maxsize)
+        self._observers[self.teller.stream.reader(room=sys.maxsize)] = callback
 
     # What anybody may ask for, on any thread
 
@@ -375,26 +372,25 @@ class TickLoop:
     # Who is told
 
     def _tell_observers(self) -> None:
-        """Call the observers with what has happened; forget the goals that are over."""
+        """Call each observer with what has happened; forget the goals that are over."""
         self.goals.forget()
-        for event in self._observed.take() if self._observed is not None else ():
-            self._emit(event)
-
-    def _emit(self, event: Event) -> None:
         steady = self._traffic.host.steady
-        for observer in list(self._observers):
-            began = steady()
-            try:
-                observer(event)
-            except BaseException as error:  # noqa: BLE001 - the run goes on without it
-                self._observers.remove(observer)
-                self._raised("an observer raised and was removed", error)
-            if (took := steady() - began) > SLOW and observer not in self._slow:
-                self._slow.append(observer)
-                self._log.warning(
-                    f"an observer has taken {took:.2f} s for one event; the tree waits for it: "
-                    "read `runner.stream` on a thread of your own instead"
-                )
+        for reader, observer in list(self._observers.items()):
+            for event in reader.take():
+                began = steady()
+                try:
+                    observer(event)
+                except BaseException as error:  # noqa: BLE001 - the run goes on without it
+                    self.teller.stream.leave(reader)
+                    self._observers.pop(reader, None)
+                    self._raised("an observer raised and was removed", error)
+                    break
+                if (took := steady() - began) > SLOW and reader not in self._slow:
+                    self._slow.add(reader)
+                    self._log.warning(
+                        f"an observer has taken {took:.2f} s for one event; the tree waits for it: "
+                        "read `runner.stream` on a thread of your own instead"
+                    )
 
     def _raised(self, what: str, error: BaseException) -> None:
         """Log it, and end the run where it is meant to end the program, as SystemExit is."""

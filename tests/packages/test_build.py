@@ -127,7 +127,7 @@ def test_a_package_of_ones_own_is_built_upon_another_and_used_by_a_tree(
 ) -> None:
     source = copy("fetch_msgs", tmp_path / "first")
     said = environment.cli("interfaces", "build", source, code=2)
-    assert "shelf_msgs/Crate is used, and shelf_msgs is neither installed nor beside" in said
+    assert "shelf_msgs/Crate is used, and shelf_msgs is not there: give the path" in said
 
     shelf = copy("shelf_msgs", tmp_path / "second")
     said = environment.cli("interfaces", "build", shelf)

@@ -29,6 +29,7 @@ from bt_actions.events import (
     to_line,
 )
 from bt_actions.events.snapshot import HIDDEN
+from bt_actions.story.state import State
 from bt_actions.story.why import why
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
 from tests.support.trees import in_sequence
@@ -341,3 +342,19 @@ root:
         goals = [e.goal for e in events_of(runner, GoalChanged) if e.goal is not None]
         assert goals == [HIDDEN, HIDDEN]
         assert not any("7777" in line for line in why(runner.state))
+
+
+def test_a_reader_that_comes_late_is_told_of_the_tree_first() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, Move, "move_robot", Script(duration=5.0))
+    runner = VirtualRunner(in_sequence(MoveRobot("m", 1.0)), network)
+    runner.start()
+    runner.advance(1.0)
+    late: list[Event] = []
+    runner.observe(late.append)
+    runner.advance(20.0)
+    assert isinstance(late[0], RunBegan)
+    state = State()
+    for event in late:
+        state.observe(event)
+    assert (state.status, state.actions[0].outcome) == (Status.SUCCESS, "SUCCEEDED")

@@ -40,7 +40,8 @@ def test_a_call_is_told_as_a_run_is(
     process = call("move", "--set", "distance=0.5", "--json")
     assert process.wait(60.0) == 1, process
     told = json.loads(process.lines[-1])
-    assert "goal_name" not in str(told), "which the command has made up"
+    reasons = [each["reason"] for each in (*told["failures"], *told["actions"])]
+    assert "goal_name" not in str([told["why"], reasons]), "which the command has made up"
     assert (told["exit_code"], told["error_code"], told["outputs"]) == (1, 20104, {})
     assert [each["outcome"] for each in told["actions"]] == ["ABORTED"]
     assert "Move / Go: ABORTED" in told["failures"][0]["reason"]

@@ -85,9 +85,7 @@ def test_a_night_of_forty_nodes_is_answered_in_a_few_lines() -> None:
     assert said[1].startswith(
         "  ABORTED: aborted by /move_robot; goal {distance: 0.0}; its result is"
     )
-    assert re.search(
-        r"night/night.yaml:\d+:\d+; passed on by Home in time \(timeout\), ", said[2]
-    )
+    assert re.search(r"night/night.yaml:\d+:\d+; passed on by Home in time \(timeout\), ", said[2])
     assert said[3] == "failed before, and dealt with:"
     second = said[4]
     for part in (
