@@ -18,7 +18,7 @@ from bt_actions.story.table import table
 from bt_actions.story.values import constants_of, feedback_text, named
 from bt_actions.story.why import why
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import MESSAGE, brief, fit
+from bt_actions.utilities.shorten import MESSAGE, brief, fit, shorten
 from bt_actions.utilities.suggest import listing
 
 _USUAL_ENDS = {
@@ -44,8 +44,8 @@ MANY = 20
 
 def begins_text(file: str, inputs: Mapping[str, object]) -> str:
     """Say that a run begins: its file, and its inputs as they may be told."""
-    words = fit(", ".join(f"{name}={brief(value)}" for name, value in inputs.items()), 200)
-    return clean(f"{f'({file}) ' if file else ''}begins{' with ' if words else ''}{words}")
+    words = fit(", ".join(f"{name}={shorten(value, 60)}" for name, value in inputs.items()), 200)
+    return clean(f"begins{f' ({file})' if file else ''}{' with ' if words else ''}{words}")
 
 
 def last_words(state: State, width: int = MESSAGE) -> list[str]:

@@ -121,7 +121,7 @@ def test_a_failure_is_told_on_rosout_with_its_reason_and_is_printed_once(
     finally:
         host.close_server(server)
     _, reason, ends = watcher.hears(logger, "ends")
-    assert begins == (20, f"one_move ({path}) begins")
+    assert begins == (20, f"one_move begins ({path})")
     assert reason[0] == 40
     assert reason[1].startswith("one_move: ")
     assert str(path) in reason[1]
@@ -143,7 +143,7 @@ def test_a_program_of_the_users_shows_its_runs_so_too(watcher: Watcher, tmp_path
         (begins,) = watcher.hears("of_a_program", "begins")
         threading.Thread(target=runner.shutdown).start()
         ends = watcher.hears("of_a_program", "ends")[-1]
-    assert begins == (20, f"quick ({path}) begins with speed=0.2")
+    assert begins == (20, f"quick begins ({path}) with speed=0.2")
     assert ends[1].startswith("quick ends: SUCCESS after ")
 
 

@@ -64,7 +64,7 @@ def test_what_is_nowhere_is_named_with_its_place_and_what_to_install(
     package: str, write: Write, prefix: Path
 ) -> None:
     said = refused([write("a_msgs", {"msg/C.msg": f"\n{package}/Pose c\n"})], prefix)
-    assert f"a_msgs/msg/C.msg:2: {package}/Pose is used, and {package} is neither" in said
+    assert f"a_msgs/msg/C.msg:2: {package}/Pose is used, and {package} is not there" in said
     assert f"`pip install ros-jazzy-{package.replace('_', '-')}`" in said
 
 
