@@ -20,6 +20,7 @@ from bt_actions.behaviours.places import root_of
 from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.events.kinds import AttemptEnded
+from bt_actions.events.snapshot import HIDDEN
 from bt_actions.events.teller import here
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
@@ -301,6 +302,8 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
 
     # What a leaf for actions of one type may know better
 
+    hides_goal = False
+    """Whether no event and no reason tells its goals."""
     tells_whole_result = False
     """Whether a result is data for a caller, so that all of it is told, however large."""
 
@@ -356,10 +359,13 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         teller = here.get()
         if teller is not None:
             teller.reads_secret = False  # whatever was read of the attempt before
-        data = resolve(self.goal() if callable(self.goal) else self.goal)
-        if teller is not None and teller.reads_secret and self._handle is not None:
-            self._handle.goal.is_secret = True
-        return fill(action.Goal, data, now=self._there()[0].stamp)
+        try:
+            data = resolve(self.goal() if callable(self.goal) else self.goal)
+            return fill(action.Goal, data, now=self._there()[0].stamp)
+        finally:
+            reads = teller is not None and teller.reads_secret
+            if (reads or self.hides_goal) and self._handle is not None:
+                self._handle.goal.is_secret = True
 
     def _judge(self, handle: GoalHandle, backend: Backend) -> AttemptRecord:
         goal = handle.goal
@@ -383,6 +389,10 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         """Tell the run what was made of an attempt."""
         if (teller := here.get()) is None or not teller.is_heard:
             return
+        hides = bool(record.reason) and (
+            teller.reads_secret
+            or (record.goal.is_secret and record.outcome is Outcome.INVALID_GOAL)
+        )
         unmet: dict[str, object] = {}
         if record.outcome is Outcome.UNEXPECTED_RESULT:
             unmet = self._reading.seen(record.result)
@@ -392,7 +402,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
             record.goal_id,
             record.attempt,
             record.outcome,
-            record.reason,
+            HIDDEN if hides else record.reason,
             self.expected if unmet else "",
             {text: teller.shown(value) for text, value in unmet.items()},
             again_in,

@@ -92,12 +92,21 @@ class Timed(Behaviour):
         """Return the seconds until it needs a tick though nothing has happened."""
         return self.left()
 
+    def left_to_run(self) -> float | None:
+        """Return the seconds until its own time runs out; None where it has none."""
+        return None
+
     def _now(self) -> float:
         return time.monotonic() if self._backend is None else self._backend.now().ros
 
 
 class Leaf(Timed):
     """A leaf that says in `do` what it does, and fails where that raises ValueError."""
+
+    _seconds = math.inf
+
+    def left_to_run(self) -> float | None:
+        return None if math.isinf(self._seconds) else self.left()
 
     def do(self) -> Status:
         """Do what a tick does; may raise ValueError (ExpressionError is one)."""

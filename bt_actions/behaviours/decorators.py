@@ -33,6 +33,8 @@ class Gate(Timed, Decorator):
     with its text.
     """
 
+    reads_secret = False
+    """Whether it has read a secret in this visit, so that no event tells what it says."""
     refused = False
     """Whether it failed by itself: its child did not, or was not ticked this time."""
 
@@ -62,7 +64,7 @@ class Gate(Timed, Decorator):
 
     def _ask(self) -> Status | None:
         if self.status is not Status.RUNNING:
-            self.feedback_message = ""
+            self.feedback_message, self.reads_secret = "", False
             self._seconds = 0.0  # where it is given none
             self.initialise()
         return self.gate()
@@ -74,7 +76,8 @@ class Gate(Timed, Decorator):
             self.feedback_message, self.refused = str(error), True
             return Status.FAILURE
         finally:
-            if (teller := here.get()) is not None:
+            if (teller := here.get()) is not None and teller.has_news:
+                self.reads_secret |= teller.reads_secret
                 teller.claim(self)
 
 
@@ -114,6 +117,9 @@ class Deadline(Gate):
         unknown = ", ".join(node.name for node in below if not node.drained)
         told = f"; the end of {unknown} is not known" if unknown else ""
         raise ValueError(f"not done within {self._seconds:g} s{told}")
+
+    def left_to_run(self) -> float | None:
+        return self.due_in()
 
     def due_in(self) -> float | None:
         """Return the seconds until the deadline."""
@@ -195,7 +201,7 @@ class Repeat(Gate):
         self._times = times
 
     def initialise(self) -> None:
-        self._done, self._of, self._told, self._hides = 0, "", -1, False
+        self._done, self._of, self._told = 0, "", -1
         self._limit: int | None = None
         if self._times is None:
             return
@@ -216,9 +222,10 @@ class Repeat(Gate):
         if self._told != self._done:
             self._told = self._done
             if (teller := here.get()) is not None and teller.is_heard:
-                self._hides |= teller.reads_secret
-                item = HIDDEN if self._hides and self.item is not None else snapshot(self.item)
-                teller.tell(RoundBegan, self, self._done, self._limit, item)
+                self.reads_secret |= teller.reads_secret
+                hides = self.reads_secret
+                item = HIDDEN if hides and self.item is not None else snapshot(self.item)
+                teller.tell(RoundBegan, self, self._done, None if hides else self._limit, item)
         return None
 
     @property
@@ -315,7 +322,7 @@ class ForEach(Repeat):
         if status is Status.FAILURE:
             self._failures += 1
             if not self._keep_going:
-                self.feedback_message = f"item {self._done} failed"
+                self.feedback_message = f"item {self._done + 1}{self._of} failed"
                 return status
         status = self.count()
         if self._failures:
@@ -330,4 +337,4 @@ class ForEach(Repeat):
         try:
             self._write(self._items[self._done], self._done)
         except ValueError as error:
-            raise ValueError(f"item {self._done}: {error}") from error
+            raise ValueError(f"item {self._done + 1}{self._of}: {error}") from error

@@ -17,7 +17,15 @@ from bt_actions.events.teller import here
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.traffic.backend import LEVELS
+from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.units import parse_duration
+
+
+def stood_for(expression: Expression, variable: Callable[[str], object]) -> str:
+    """Say behind a colon what stands for the variables in a condition; or ""."""
+    seen = expression.seen({}, variable).items()
+    stood = ", ".join(f"{name} is {shorten(value, 60)}" for name, value in seen)
+    return f": {stood}" if stood else ""
 
 
 class Wait(Leaf):
@@ -72,7 +80,8 @@ class Check(Leaf):
 
     def do(self) -> Status:
         if not self.expression.holds({}, self._variable):
-            raise ValueError(f"{self.expression.text.strip()} is false")
+            text = self.expression.text.strip()
+            raise ValueError(f"{text} is false{stood_for(self.expression, self._variable)}")
         return Status.SUCCESS
 
 

@@ -58,6 +58,11 @@ def unhide(keys: Iterable[str]) -> None:
     _secret.difference_update(keys)
 
 
+def is_hidden(key: str) -> bool:
+    """Whether the value of this key is told by no event."""
+    return key in _secret
+
+
 def value_of(key: str) -> Any:
     """Return the value of an absolute key, and take note where that is a secret.
 
@@ -99,6 +104,9 @@ def write(values: Mapping[str, object]) -> None:
             teller.wrote(name, value)
 
 
+_WRITES = (ActivityType.WRITE.value, ActivityType.INITIALISED.value)
+
+
 class _Overhearing(ActivityStream):
     """Tells the run that ticks on this thread what a client of the blackboard writes.
 
@@ -116,12 +124,12 @@ class _Overhearing(ActivityStream):
         """Take note of a client's activity (py_trees calls this)."""
         if self.before is not None:
             self.before.push(activity_item)
-        written = activity_item.activity_type in (
-            ActivityType.WRITE.value,
-            ActivityType.INITIALISED.value,
-        )
-        if written and (teller := here.get()) is not None:
-            teller.reads_secret |= activity_item.key in _secret
+        if (teller := here.get()) is None:
+            return
+        teller.reads_secret |= activity_item.key in _secret
+        if activity_item.activity_type in _WRITES:
+            if teller.reads_secret:
+                hide([activity_item.key])
             teller.wrote(activity_item.key, activity_item.current_value)
 
 

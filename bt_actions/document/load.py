@@ -232,6 +232,14 @@ def tree_outputs(root: Behaviour) -> dict[str, object]:
     return found
 
 
+def hidden_outputs(root: Behaviour) -> set[str]:
+    """Return the names of the outputs of a loaded tree that come of a secret."""
+    loaded = getattr(root, LOADED, None)
+    if not isinstance(loaded, Loaded):
+        return set()
+    return {name for name in loaded.document.outputs if loaded.scope.hides(name)}
+
+
 @_no_collecting
 def check_file(path: PathLike, *, types: bool = True, python: bool = True) -> list[Finding]:
     """Everything that is wrong with a tree, and with all that it includes and imports.

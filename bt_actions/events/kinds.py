@@ -86,6 +86,13 @@ class NodesAdded(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class NodesRemoved(Event):
+    """Nodes are in the tree no more."""
+
+    nodes: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class NodeChanged(Event):
     """A node has another status, or has ended again: each visit is told, its RUNNING ticks once."""
 
@@ -96,6 +103,8 @@ class NodeChanged(Event):
     """Of a FAILURE: no failure below the node has caused it."""
     warning: str = ""
     """Of a SUCCESS: why that may not be what was meant."""
+    due_in: float | None = None
+    """Of RUNNING: seconds until the node's own time runs out, where it has one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +161,7 @@ class VariableWritten(Event):
     Of a variable of the user's own, the blackboard's key."""
     value: Value
     node: int | None
-    """Who wrote it, where that is known."""
+    """The node in whose tick it was written, where that is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +216,7 @@ class StopWanted(Event):
     """Somebody asks the run to end: its goals are canceled and drained."""
 
     who: str
-    """A signal, ``--timeout``, ``client``, ``halt``, ``interrupt()`` and the like."""
+    """SIGINT and the like, TIMEOUT (`--timeout`), SIGPIPE; of a served run CANCELED, HALTED, ..."""
     why: str
     """In words, to follow the status: ``interrupted by SIGINT``."""
     leaves: bool = False

@@ -54,6 +54,8 @@ class _Snapshot:
         if value is None or type(value) in (bool, int, float):
             self._size -= 8
             return _bounded(value)  # type: ignore[arg-type]
+        if isinstance(value, Cut):
+            return value
         try:
             return self._of(value, depth)
         except Exception:  # noqa: BLE001 - a value's own methods may raise anything

@@ -13,6 +13,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from py_trees.common import Status
+
 from bt_actions.events.kinds import (
     ClockJumped,
     Event,
@@ -33,6 +35,8 @@ SPARED = (FeedbackCame, VariableWritten, NodeChanged, RoundBegan, Logged)
 """Kinds that are left out for a slow reader; goals and the run itself never are."""
 JUMP = 0.5
 """Seconds by which a clock has to differ from the steady one at once to have jumped."""
+SLEW = 0.001
+"""How much faster or slower the wall clock may run without having jumped, as NTP lets it."""
 Clock = Callable[[], tuple[float, float, float]]
 """The steady, the wall and the ROS clock, in seconds."""
 
@@ -54,7 +58,7 @@ class Reader:
 
     def put(self, event: Event) -> None:
         """Add an event; for the stream alone, under its lock."""
-        if len(self._events) >= self._room and isinstance(event, SPARED):
+        if len(self._events) >= self._room and _is_spared(event):
             self._lost += 1
             return
         new = [EventsLost(event.at, self._lost), event] if self._lost else [event]
@@ -62,6 +66,12 @@ class Reader:
         self._events.extend(new)
         if len(self._events) <= len(new):  # looked at last: the reader takes without the lock
             self._poke()
+
+
+def _is_spared(event: Event) -> bool:
+    """Whether a slow reader has to do without an event: never without a failure."""
+    failed = isinstance(event, NodeChanged) and event.status is Status.FAILURE
+    return isinstance(event, SPARED) and not failed
 
 
 class Stream:
@@ -85,7 +95,7 @@ class Stream:
         """Return a reader of all events from now on, behind those that tell of the tree's nodes.
 
         `poke` is called, on the thread of an event and under the lock, where one comes to an empty
-        queue; it must not wait.
+        queue; it must not wait, and a reader whose `poke` raises is let go of.
         """
         reader = Reader(poke, room)
         with self._lock:
@@ -119,7 +129,10 @@ class Stream:
         elif isinstance(event, NodesAdded):
             self._nodes += (event,)
         for reader in self._readers:
-            reader.put(event)
+            try:
+                reader.put(event)
+            except Exception:  # noqa: BLE001 - its poke: any; nobody else must suffer from it
+                self._readers = tuple(each for each in self._readers if each is not reader)
 
     def _jumps(self, now: tuple[float, float, float]) -> list[tuple[str, float]]:
         """Which clocks have jumped since the last event, and by how much."""
@@ -127,5 +140,6 @@ class Stream:
         if last is None:
             return []
         steady, wall, ros = (each - before for each, before in zip(now, last, strict=True))
-        jumps = [("wall", wall - steady)] if abs(wall - steady) > JUMP else []
+        is_set = abs(wall - steady) > JUMP + SLEW * steady
+        jumps = [("wall", wall - steady)] if is_set else []
         return [*jumps, ("ros", ros)] if ros < 0.0 else jumps

@@ -74,10 +74,13 @@ class Teller:
         """Return a snapshot of what a node has just computed, if that may be told."""
         return HIDDEN if self.reads_secret else snapshot(value)
 
+    @property
+    def has_news(self) -> bool:
+        """Whether a node has written, or read a secret, since the last claim."""
+        return self.reads_secret or bool(self._written) or bool(self._waiting)
+
     def claim(self, node: object) -> None:
-        """What was written since the last claim, `node` has written."""
-        self.run_id = ""
-        """32 hexadecimal digits, another one in each run."""
+        """Attribute all that was written since the last claim to `node`."""
         self.reads_secret = False
         if not self._written and not self._waiting:
             return

@@ -146,7 +146,9 @@ class Facts:
     @property
     def fields(self) -> str:
         """The fields that the goal message gives, in short: ``{distance: 12.0}``; or ""."""
-        if self.message is None or self.is_secret:
+        if self.is_secret:
+            return "•••"
+        if self.message is None:
             return self._fields_then
         given = given_fields(self.message)
         asks = {name: given[name] for name in given if name not in self.untold}

@@ -12,10 +12,10 @@ from typing import Any, TypeVar
 from bt_actions.events import FeedbackCame, GoalChanged, ServerSeen
 from bt_actions.events.snapshot import HIDDEN, snapshot
 from bt_actions.events.teller import OFTEN, Teller, here
-from bt_actions.goals.policy import End
+from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.terms import State
 from bt_actions.goals.unaccounted import GoalReport, report_of
-from bt_actions.traffic.state import GoalHandle, Run, ticking_run
+from bt_actions.traffic.state import GoalHandle, Host, Run, ticking_run
 
 T = TypeVar("T")
 
@@ -28,15 +28,18 @@ class RunGoals:
         teller: Teller,
         wake: Callable[[], None],
         changed: Callable[[], None],
-        steady: Callable[[], float],
+        host: Host,
     ) -> None:
         """`wake` is called where there is reason to tick.
 
         `changed` is called, under the lock of the traffic, where one of ours has changed.
         """
-        self._teller, self._wake, self._changed, self._steady = teller, wake, changed, steady
+        self._teller, self._wake, self._changed = teller, wake, changed
+        self._lock, self._steady = host.lock, host.steady
         self._run = Run(self._note, self._feedback, self._sight)
         self._handles: dict[GoalHandle, _Told] = {}  # in the order in which they began
+        self._late: dict[GoalHandle, None] = {}
+        """Those with feedback that was not told yet."""
         self.run_goes_on = False
         """Between two runs only what earlier ones have left is of interest."""
         self.is_watched = True
@@ -77,10 +80,21 @@ class RunGoals:
         self._run.feedback = lambda handle, message: None
         self._run.sight = lambda server, in_sight: None
 
+    def tell_feedback(self) -> None:
+        """Tell feedback that came too soon after the one before, when its time has come."""
+        if not self._late:
+            return
+        with self._lock:
+            now = self._steady()
+            for handle in [each for each in self._late if now - self._handles[each].at >= OFTEN]:
+                self._handles[handle].at = now
+                self._tell_feedback(handle, self._handles[handle])
+
     def forget(self) -> None:
         """Forget what is over."""
         for done in [each for each in list(self._handles) if each.is_over]:
             del self._handles[done]
+            self._late.pop(done, None)
 
     # Under the lock of the traffic, on any thread
 
@@ -88,8 +102,9 @@ class RunGoals:
         if handle is not None:
             goal = handle.goal
             is_news = handle in self._handles  # else its leaf is just beginning it
-            told = self._handles.setdefault(handle, _Told())
-            if self._teller.is_heard:
+            told = self._handles.setdefault(handle, _Told(self._teller.run_id))
+            is_of_this_run = told.run_id == self._teller.run_id
+            if self._teller.is_heard and is_of_this_run:
                 self._tell(handle, told)
             self._changed()
             may_be_sent = is_news and goal.state is State.WAITING_FOR_SERVER
@@ -109,7 +124,9 @@ class RunGoals:
             values["result"] = snapshot(goal.result, **whole)
         if goal.outcome is not None:
             self._tell_feedback(handle, told)
-        said = goal.state.shown, goal.outcome, goal.end, goal.reason, goal.server
+        invalid = goal.is_secret and goal.outcome is Outcome.INVALID_GOAL
+        reason = HIDDEN if invalid else goal.reason
+        said = goal.state.shown, goal.outcome, goal.end, reason, goal.server
         self._teller.tell(GoalChanged, handle.owner, goal.id.hex(), handle.attempt, *said, **values)
 
     def _feedback(self, handle: GoalHandle, message: Any) -> None:
@@ -118,6 +135,7 @@ class RunGoals:
             return
         told.feedback = snapshot(message) if handle.keeps_feedback else message
         now = self._steady()
+        self._late[handle] = None
         if now - told.at >= OFTEN:
             told.at = now
             self._tell_feedback(handle, told)
@@ -128,6 +146,7 @@ class RunGoals:
     def _tell_feedback(self, handle: GoalHandle, told: _Told) -> None:
         """Tell the latest that was not told yet."""
         message, told.feedback = told.feedback, None
+        self._late.pop(handle, None)
         if message is not None:
             self._teller.tell(FeedbackCame, handle.owner, handle.goal.id.hex(), snapshot(message))
 
@@ -135,9 +154,10 @@ class RunGoals:
 class _Told:
     """What was told of one goal."""
 
-    __slots__ = ("at", "feedback", "result")
+    __slots__ = ("at", "feedback", "result", "run_id")
 
-    def __init__(self) -> None:
+    def __init__(self, run_id: str) -> None:
+        self.run_id = run_id
         self.result = False
         self.at = float("-inf")
         """When feedback was told."""

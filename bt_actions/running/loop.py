@@ -94,7 +94,7 @@ class TickLoop:
             self.teller,
             wake,
             lambda: self._traffic.host.scheduler.add(self.watchdog),
-            self._traffic.host.steady,
+            self._traffic.host,
         )
         self.watchdog = Watchdog(self._traffic, self.goals)
         self._nodes = set[Behaviour]()  # of the tree, and set up
@@ -141,7 +141,9 @@ class TickLoop:
         self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
         self._error = self._drain = None
         self._status, self._burst = Status.INVALID, 0
-        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each, self.teller.changed)
+        self._visitor = ChangeVisitor(
+            self._set_up_missing, self._after_each, self.teller.changed, self.teller.goes_on
+        )
         self.teller.begin()
         self.goals.run_goes_on = True
         self.watchdog.begin(self._deadline)
@@ -374,6 +376,7 @@ class TickLoop:
     def _tell_observers(self) -> None:
         """Call each observer with what has happened; forget the goals that are over."""
         self.goals.forget()
+        self.goals.tell_feedback()
         steady = self._traffic.host.steady
         for reader, observer in list(self._observers.items()):
             for event in reader.take():

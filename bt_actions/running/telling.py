@@ -6,7 +6,7 @@ import contextlib
 import platform
 import sys
 import traceback
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 
@@ -15,9 +15,11 @@ from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 
 from bt_actions import document
+from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.connected import Timed
 from bt_actions.behaviours.variables import overhear, overhear_less
 from bt_actions.document.describing import describe
-from bt_actions.events import Node, NodeChanged, NodesAdded, RunBegan, TreeFinished
+from bt_actions.events import Node, NodeChanged, NodesAdded, NodesRemoved, RunBegan, TreeFinished
 from bt_actions.events.snapshot import HIDDEN, snapshot
 from bt_actions.events.stream import Stream
 from bt_actions.events.teller import Teller
@@ -43,9 +45,9 @@ class TreeTeller(Teller):
         self._host = backend.traffic.host
         self._has_begun = self._overhears = False
         """Whether this run was told of, and what clients of the blackboard write is."""
-        self._ros = 0.0
-        self._hidden = set[str]()
-        """Messages of nodes that had read a secret."""
+        self._ros, self._last = 0.0, 0
+        self._hidden: dict[Behaviour, str] = {}
+        """The latest messages of nodes that had read a secret: their parents may take them over."""
         self.asked_by = "", ""
         """The id of the RunTree goal that the runs answer, and that of its caller's run."""
         super().__init__(Stream(self._moment), self._host.steady)
@@ -74,12 +76,19 @@ class TreeTeller(Teller):
         self.forget()
         if not self.is_heard:
             return
+        with self._host.lock:  # what comes for goals waits, so that RunBegan is the first
+            self._tell_began(root)
+
+    def _tell_began(self, root: Behaviour) -> None:
         given = document.given_inputs(root)
+        self.reads_secret = False
+        self._hidden.clear()
+        self.numbers, self._last = {}, 0
         self.stream.add(
             RunBegan,
             self.run_id,
             document.tree_name(root),
-            self._new(),
+            self._new(_in_order(root)),
             {
                 name: HIDDEN if each.secret else snapshot(value)
                 for name, (each, value) in given.items()
@@ -90,36 +99,50 @@ class TreeTeller(Teller):
         )
 
     def added(self) -> None:
-        """Tell of nodes that were inserted since the run began."""
-        if self._has_begun and self.is_heard and (new := self._new()):
+        """Tell of nodes that were inserted since the run began, and of those taken out."""
+        if not (self._has_begun and self.is_heard):
+            return
+        nodes = list(_in_order(self._tree.root))
+        gone = {each for each in set(self.numbers).difference(nodes) if _is_over(each)}
+        if gone:
+            self.stream.add(NodesRemoved, tuple(sorted(self.numbers.pop(each) for each in gone)))
+        if new := self._new(nodes):
             self.stream.add(NodesAdded, new)
 
-    def _new(self) -> tuple[Node, ...]:
+    def _new(self, nodes: Iterable[Behaviour]) -> tuple[Node, ...]:
         """Give the nodes that have none their numbers; return what is told of them."""
         numbers, found = self.numbers, []
-        for node in _in_order(self._tree.root):
+        for node in nodes:
             if node not in numbers:
-                numbers[node] = len(numbers) + 1
+                self._last += 1
+                numbers[node] = self._last
                 parent = None if node.parent is None else numbers.get(node.parent)
-                found.append(describe(node, numbers[node], parent))
+                found.append(describe(node, self._last, parent))
         return tuple(found)
 
     def changed(self, node: Behaviour) -> None:
         """Tell the status that a node has now; on the ticking thread, as its tick returns."""
         if not self.is_heard:
             return
-        message = node.feedback_message
-        if message and (self.reads_secret or message in self._hidden):
-            self._hidden.add(message)  # parents may take it over
-            message = HIDDEN
+        message, status, more = node.feedback_message, node.status, dict[str, object]()
+        is_secret = self.reads_secret or bool(getattr(node, "reads_secret", False))
+        from_below = any(self._hidden.get(child) == message for child in node.children)
+        if message and (is_secret or from_below):
+            self._hidden[node], message = message, HIDDEN
         self.claim(node)
-        status, more = node.status, dict[str, object]()
         if status is Status.FAILURE:
             self.all_written()
             more["by_itself"] = bool(getattr(node, "refused", False))
         elif status is Status.SUCCESS:
             more["warning"] = str(getattr(node, "warning", ""))
+        elif status is Status.RUNNING and isinstance(node, Timed):
+            more["due_in"] = None if is_secret else node.left_to_run()
         self.tell(NodeChanged, node, status, message, **more)
+
+    def goes_on(self, node: Behaviour) -> None:
+        """Take note that a node that runs has been ticked."""
+        if self.has_news:
+            self.claim(node)
 
     def finished(
         self, status: Status, error: BaseException | None, unaccounted: list[GoalReport]
@@ -131,14 +154,23 @@ class TreeTeller(Teller):
             self.began()
         self.all_written()
         outputs = document.tree_outputs(self._tree.root) if status is Status.SUCCESS else {}
+        hidden = document.hidden_outputs(self._tree.root)
         self.stream.add(
             TreeFinished,
             status,
-            {name: snapshot(each, fields=_ALL, size=_ALL) for name, each in outputs.items()},
+            {
+                name: HIDDEN if name in hidden else snapshot(each, fields=_ALL, size=_ALL)
+                for name, each in outputs.items()
+            },
             "" if error is None else where_raised(error),
             isinstance(error, UnusableTree),
             tuple(unaccounted),
         )
+
+
+def _is_over(node: object) -> bool:
+    """Whether nothing more will be told of a node that is in the tree no more."""
+    return not isinstance(node, ActionBehaviour) or (node.drained and not node.draining)
 
 
 def where_raised(error: BaseException) -> str:

@@ -69,15 +69,17 @@ class ChangeVisitor(VisitorBase):
         before: Callable[[], None],
         after_each: Callable[[], str],
         tell: Callable[[Behaviour], None] = lambda behaviour: None,
+        settle: Callable[[Behaviour], None] = lambda behaviour: None,
     ) -> None:
         """`before` is called between the handlers of a tick and its first behaviour.
 
         `after_each` is called when a behaviour has ticked, and what it returns is its misbehaviour.
         `tell` is called then, where its status is another or its visit ends, and for what was
-        stopped.
+        stopped; `settle` for each that goes on running.
         """
         super().__init__(full=False)
         self._before, self._after_each, self._tell = before, after_each, tell
+        self._settle = settle
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
         self._kinds = {Behaviour}  # of what was visited: anything, for a tree that shows nothing
@@ -100,7 +102,7 @@ class ChangeVisitor(VisitorBase):
         and goes on with its parent. Nothing else leaves that after a tick.
         """
         after_each, visited, none = self._after_each, self._visited, Status.INVALID
-        live, running, tell = self._live, Status.RUNNING, self._tell
+        live, running, tell, settle = self._live, Status.RUNNING, self._tell, self._settle
         for behaviour in ticked:
             for visitor in others:
                 behaviour.visit(visitor)
@@ -117,6 +119,8 @@ class ChangeVisitor(VisitorBase):
             elif behaviour not in live:
                 live[behaviour] = None
                 tell(behaviour)
+            else:
+                settle(behaviour)
             if wrong := after_each():
                 raise Misbehaviour(behaviour, wrong)
 

@@ -151,6 +151,9 @@ class ActionStory:
         self.reason = goal.reason
 
     def _begin(self, event: GoalChanged) -> GoalStory:
+        if event.outcome is not None and self.latest is not None:  # of a visit that is forgotten
+            late = self.goals[event.goal_id] = GoalStory(event, event.at, event.at)
+            return late
         if event.attempt <= 1:
             kept = {each.goal_id for each in (*self.open, *self.given_up)}
             self.goals = {key: goal for key, goal in self.goals.items() if key in kept}

@@ -22,6 +22,7 @@ from bt_actions.events.kinds import (
     Node,
     NodeChanged,
     NodesAdded,
+    NodesRemoved,
     Paused,
     RoundBegan,
     RunBegan,
@@ -59,6 +60,8 @@ class NodeStory:
     number: int = 0
     """The number of its latest event."""
     warning: str = ""
+    due_in: float | None = None
+    """Seconds from `since` on until its own time runs out."""
     round: RoundBegan | None = None
     """The latest round of a loop."""
     pending: list[Failure] = field(default_factory=list)
@@ -84,6 +87,8 @@ class Failure:
     """What the action did; None for a node that is no action."""
     attempts: tuple[GoalStory, ...] = ()
     """Of an action: the goals of the visit that failed."""
+    below: tuple[Failure, ...] = ()
+    """What the node has stopped, where its time was over, or its guard did not hold."""
     by: Node | None = None
     """The node that went on in spite of it; None while it is passed on upwards."""
 
@@ -116,6 +121,8 @@ class State:
         self.ended: RunEnded | None = None
         self.stop: StopWanted | None = None
         """What asked the run to end; the first counts."""
+        self.stopped: list[Failure] = []
+        """What ran when the run was asked to end."""
         self.left = False
         """Whether goals that are being drained are waited for no longer."""
         self.paused = False
@@ -135,6 +142,9 @@ class State:
     def observe(self, event: Event) -> None:
         """Take in one event, in the order of their numbers."""
         self.now = event.at
+        node = getattr(event, "node", None)
+        if isinstance(node, int) and node not in self.nodes:
+            return  # of a node that is gone, or of a run whose beginning this reader has not seen
         match event:
             case NodeChanged():
                 self._node_changed(event)
@@ -153,13 +163,25 @@ class State:
                 self.servers[event.server] = event
             case NodesAdded():
                 self._add(event.nodes)
+            case NodesRemoved():
+                self._remove(event.nodes)
             case RunBegan():
+                stop, left, servers = self.stop, self.left, self.servers
+                is_new = self.began is None or (
+                    self.finished is not None
+                    and stop is not None
+                    and stop.at.number > self.finished.at.number
+                )
                 self.__init__()  # type: ignore[misc]
+                if is_new:  # what came while the tree was set up
+                    self.stop, self.left, self.servers = stop, left, servers
                 self.now, self.began = event.at, event
                 self._add(event.nodes)
                 self.root = event.nodes[0].id
             case StopWanted():
-                self.stop = self.stop or event
+                if self.stop is None:
+                    self.stop = event
+                    self.stopped = [self._failure(each, each.message) for each in self.running]
                 self.left |= event.leaves
             case Paused():
                 self.paused = event.paused
@@ -179,6 +201,13 @@ class State:
                 self.nodes[node.parent].children.append(node.id)
         self._called.clear()
 
+    def _remove(self, nodes: tuple[int, ...]) -> None:
+        for number in nodes:
+            story = self.nodes.pop(number)
+            if story.node.parent in self.nodes:
+                self.nodes[story.node.parent].children.remove(number)
+        self._called.clear()
+
     def _node_changed(self, event: NodeChanged) -> None:
         story = self.nodes[event.node]
         before = story.status
@@ -188,7 +217,7 @@ class State:
             self._deal_with(story.pending, story.node.parent)
             story.pending = []
         story.status, story.message, story.number = event.status, event.message, event.at.number
-        story.since, story.warning = event.at, event.warning
+        story.since, story.warning, story.due_in = event.at, event.warning, event.due_in
         if event.warning and event.status is Status.SUCCESS:
             self._warnings[event.node] = Warned(story.node, self.path(event.node), event.warning)
         if event.status is Status.FAILURE:
@@ -207,25 +236,38 @@ class State:
                 below.pending = []
             else:
                 self._settle(child, event.node)
-        story.pending = passed or [self._failure(story, event)]
+        if event.node in self._actions:
+            self._actions[event.node].failed += 1
+        story.pending = passed or [self._failure(story, event.message)]
 
-    def _failure(self, story: NodeStory, event: NodeChanged) -> Failure:
-        action = self._actions.get(event.node)
-        if action is not None:
-            action.failed += 1
+    def _failure(self, story: NodeStory, message: str) -> Failure:
+        number = story.node.id
+        action = self._actions.get(number)
         return Failure(
             story.node,
-            event.at,
-            self.path(event.node),
-            event.message,
+            self.now or Moment(0, 0.0, 0.0, 0.0),
+            self.path(number),
+            message,
             tuple(
                 (above.node, above.round)
-                for above in reversed(list(self.above(event.node)))
+                for above in reversed(list(self.above(number)))
                 if above.round is not None
             ),
             action,
             tuple(action.tried) if action is not None else (),
+            tuple(self._failure(each, each.message) for each in self._stopped_below(story)),
         )
+
+    def _stopped_below(self, story: NodeStory) -> list[NodeStory]:
+        """The leaves that a node has stopped in the visit that has failed."""
+        found, waiting = list[NodeStory](), list(story.children)
+        while waiting:
+            below = self.nodes[waiting.pop()]
+            waiting += below.children
+            is_stopped = below.status in (Status.INVALID, Status.RUNNING)
+            if below.is_leaf and is_stopped and below.number > story.ended:
+                found.append(below)
+        return found[:2]
 
     def _settle(self, child: int, by: int) -> None:
         """What failed at or below `child` did not make `by` fail."""
@@ -306,6 +348,10 @@ class State:
         """When the latest event happened, in seconds on the steady clock."""
         return self.now.steady if self.now is not None else 0.0
 
+    def since_began(self, now: float) -> float:
+        """Return the seconds from the run's beginning to `now`; zero before it."""
+        return max(0.0, now - self.started) if self.began is not None else 0.0
+
     @property
     def elapsed(self) -> float:
         """The seconds from the run's beginning to the latest event."""
@@ -343,7 +389,12 @@ class State:
             paths = {key: self.path(key) for key, each in self.nodes.items() if each.is_leaf}
             names = told_apart(paths.values())
             self._called = {key: names[path] for key, path in paths.items()}
-        return self._called.get(node) or self.nodes[node].node.name
+        return self._called.get(node) or self._node(node).name
+
+    def _node(self, number: int) -> Node:
+        """Return a node, also an action that is in the tree no more."""
+        story = self.nodes.get(number)
+        return story.node if story is not None else self._actions[number].node
 
     @property
     def running(self) -> list[NodeStory]:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
+from py_trees.common import Status
+
 from bt_actions.events.kinds import Node, RoundBegan
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory, GoalStory
@@ -42,17 +44,24 @@ def why(state: State, now: float | None = None) -> list[str]:
     """
     if state.finished is None:
         return waits(state, state.latest if now is None else now)
-    causes = [list(_told(failure, state)) for failure in state.failures]
-    if not causes:
+    stories = [list(_told(failure, state)) for failure in state.failures]
+    if state.finished.error:
+        stories = [[clean(f"{_clock(state.finished.at.wall)}  {state.finished.error}")]]
+    elif state.status is Status.INVALID and state.stopped:
+        stories = [["stopped while it ran:"], *(list(_told(each, state)) for each in state.stopped)]
+    if not stories:
         return []
     dealt = list(_dealt_with(state))
     room = LINES - len(dealt)
     lines: list[str] = []
-    for number, cause in enumerate(causes):
+    for number, cause in enumerate(stories):
         if lines and len(lines) + len(cause) > room:
-            lines.append(f"and {len(causes) - number} more failed")
+            more = [each[0].strip().rpartition(" / ")[2] for each in stories[number:]]
+            lines.append(f"and {len(more)} more: {', '.join(more)}")
             break
         lines += cause
+    if state.lost:
+        lines.append(f"{state.lost} events were lost to this reader: there may be more to it")
     return [fit(line) for line in lines + dealt]
 
 
@@ -84,9 +93,12 @@ def _doing(state: State, story: NodeStory, now: float) -> str:
     name = state.called(story.node.id)
     since = max(0.0, now - story.since.steady) if story.since is not None else 0.0
     if not state.acts(story.node.id):
-        return f"{name} runs for {since:.1f} s{f': {story.message}' if story.message else ''}"
+        its_time = "" if story.due_in is None else f"; its time is {story.due_in:g} s"
+        said = f": {story.message}" if story.message and not its_time else ""
+        return f"{name} runs for {since:.1f} s{its_time}{said}"
     action = state.action(story.node.id)
-    assert action.latest is not None
+    if action.latest is None:
+        return f"{name} runs for {since:.1f} s"
     due, since = due_of(action, now), max(0.0, now - action.latest.since.steady)
     if due is not None and due.name == "backoff":
         told = f"{action.outcome}: {action.reason}"
@@ -107,6 +119,11 @@ def _told(failure: Failure, state: State) -> Iterator[str]:
     items = "".join(f", {_item(*each)}" for each in failure.items)
     yield clean(f"{_clock(failure.at.wall)}  {' / '.join(failure.path)}{items}")
     yield from _attempts(failure)
+    for each in failure.below:
+        said = each.message
+        if each.action is not None and each.attempts:
+            said = attempt_text(each.action, each.attempts[-1])
+        yield clean(f"  it stopped {each.node.name}{f': {said}' if said else ''}")
     passed = ", ".join(
         f"{above.node.name} ({above.node.kind})" for above in state.above(failure.node.id)
     )
@@ -124,11 +141,18 @@ def _attempts(failure: Failure) -> Iterator[str]:
         yield clean(f"  {goals[-1].outcome}: the run at {action.server} has failed:")
         yield from (f"    {clean(line)}" for line in below.splitlines()[:BELOW])
         return
-    if len(goals) > ATTEMPTS:
+    told: list[tuple[int, int, str]] = []
+    for goal in goals:
+        number, text = goal.latest.attempt, attempt_text(action, goal)
+        if told and told[-1][2] == text:
+            told[-1] = (told[-1][0], number, text)
+        else:
+            told.append((number, number, text))
+    if len(told) > ATTEMPTS:
         yield f"  {len(goals)} attempts, the last {ATTEMPTS}:"
-    for goal in goals[-ATTEMPTS:]:
-        number = f"attempt {goal.latest.attempt}: " if len(goals) > 1 else ""
-        yield clean(f"  {number}{attempt_text(action, goal)}")
+    for first, last, text in told[-ATTEMPTS:]:
+        which = f"attempt {first}: " if first == last else f"attempts {first} to {last}: "
+        yield clean(f"  {which if len(goals) > 1 else ''}{text}")
 
 
 def attempt_text(action: ActionStory, goal: GoalStory) -> str:
@@ -138,7 +162,8 @@ def attempt_text(action: ActionStory, goal: GoalStory) -> str:
         seen = ", ".join(
             f"{name} is {shorten(value, LONG)}" for name, value in verdict.seen.items()
         )
-        why_not = f"expected {verdict.expect}{f', and {seen}' if seen else ''}"
+        wanted = f"expected {fit(verdict.expect, 100)}"
+        why_not = f"{seen}; {wanted}" if seen else wanted
     else:  # of an end that is not known the run tells at its end
         why_not = "" if goal.latest.end is End.UNKNOWN else goal.reason
     told = f"{goal.outcome}: {why_not}" if why_not else f"{goal.outcome}"
@@ -147,26 +172,30 @@ def attempt_text(action: ActionStory, goal: GoalStory) -> str:
         told += f"; goal {sent}"
     if goal.outcome is Outcome.UNEXPECTED_RESULT and goal.result is not None:
         told += f"; result {shorten(opened(goal.result), LONG)}"
-    elif goal.result is None and goal.feedback is not None:
+    elif goal.feedback is not None and goal.outcome not in (Outcome.ABORTED, Outcome.SUCCEEDED):
         told += f"; last feedback {shorten(opened(goal.feedback.feedback), LONG)}"
     return told
 
 
 def _dealt_with(state: State) -> Iterator[str]:
     """Yield the last failures that somebody went on in spite of."""
-    dealt = list(state.dealt_with)[-2:]
-    if not dealt:
+    groups: dict[object, tuple[Failure, int]] = {}  # rounds of one retry are told once
+    for failure in state.dealt_with:
+        kept = [each for each in failure.items if each[0] is not failure.by]
+        key = failure.node.id, tuple((node.id, begun.number) for node, begun in kept)
+        groups[key] = failure, groups.pop(key, (failure, 0))[1] + 1
+    if not groups:
         return
-    count = state.dealt_with_in_all
-    which = "" if count == len(dealt) else f" (the last 2 of {count})"
-    yield f"failed before, and dealt with{which}:"
-    for failure in dealt:
+    are_all = len(groups) <= 2 and len(state.dealt_with) == state.dealt_with_in_all
+    yield f"failed before, and dealt with{'' if are_all else ' (the last 2)'}:"
+    for failure, times in list(groups.values())[-2:]:
         items = "".join(f", {_item(*each)}" for each in failure.items)
         last = failure.attempts[-1] if failure.attempts else None
         said, tries = failure.message, ""
         if failure.action is not None and last is not None:
             said = attempt_text(failure.action, last)
             tries = f" after {len(failure.attempts)} attempts" if len(failure.attempts) > 1 else ""
+        tries += f", {times} times" if times > 1 else ""
         by = f"; {failure.by.name} ({failure.by.kind}) went on" if failure.by is not None else ""
         name = state.called(failure.node.id)
         yield clean(f"  {_clock(failure.at.wall)}  {name}{items}, failed{tries}: {brief(said)}{by}")

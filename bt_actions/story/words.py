@@ -91,9 +91,9 @@ def left_open(state: State) -> list[str]:
 
 
 def error_text(state: State) -> str:
-    """Say what a behaviour raised, or else what of the run no failure of its tree says."""
+    """Say what of the run no failure of its tree says, nor what a behaviour raised."""
     if state.finished is not None and (state.finished.error or state.failures):
-        return state.finished.error
+        return ""
     return state.ended.error if state.ended is not None else ""
 
 

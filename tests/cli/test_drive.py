@@ -316,7 +316,7 @@ def test_an_exception_in_the_tree_is_a_failure_and_is_told_with_its_place(story:
     told = story.finish(Status.INVALID, error="a bug (own.py:3)")
     run = Run(FakeRunner([story.began, told], error=RuntimeError("a bug")))
     assert run.go() is Exit.FAILURE
-    assert run.out.getvalue().splitlines()[-1] == "a bug (own.py:3)"
+    assert run.out.getvalue().splitlines()[-1].endswith("  a bug (own.py:3)")
     for events in ([], [story.began], [story.began, story.finish(Status.SUCCESS)]):
         run = Run(FakeRunner(events, error=RuntimeError("a bug")))
         assert run.go() is Exit.FAILURE

@@ -209,7 +209,7 @@ def test_a_goal_that_waits_gets_a_line_when_it_waits_for_a_second(
         lines.feeding.frame(story.time + waited)
         assert len(lines.said) == (waited >= LASTING)
     assert lines.out.getvalue().splitlines() == [
-        f"    2.00 s  goal     Deliver / Work / Step 0: {words} move_robot"
+        f"    2.00 s  goal     Deliver / Work / Step 0: {words} move_robot, for 1 s"
     ], "the time at which it had lasted, whenever that was drawn"
 
 
@@ -228,7 +228,7 @@ def test_what_lasted_has_its_line_before_the_event_that_ends_it_also_where_nothi
     drawn.feed(*events[2:])
     assert drawn.out.getvalue() == stored.out.getvalue()
     assert stored.out.getvalue().splitlines() == [
-        "    1.50 s  goal     Deliver / Work / Step 0: waiting for its turn on move_robot",
+        "    1.50 s  goal     Deliver / Work / Step 0: waiting for its turn on move_robot, for 1 s",
         "    6.60 s  goal     Deliver / Work / Step 0: executing on move_robot",
     ]
 

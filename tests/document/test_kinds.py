@@ -193,7 +193,7 @@ def test_while_ticks_its_child_as_long_as_the_condition_holds(load: Load) -> Non
 
 def test_check_fails_with_a_readable_reason_and_never_raises(load: Load) -> None:
     for text, reason in (
-        ("$count > 1", "$count > 1 is false"),
+        ("$count > 1", "$count > 1 is false: $count is 1"),
         ("$n > 1", "$n has no value"),
         ("1 / ($count - 1) > 0", "1 / ($count - 1) divides by zero"),
     ):

@@ -22,13 +22,16 @@ from bt_actions.events import (
     GoalChanged,
     NodeChanged,
     NodesAdded,
+    NodesRemoved,
     RoundBegan,
     RunBegan,
     ServerSeen,
+    StopWanted,
     VariableWritten,
     to_line,
 )
 from bt_actions.events.snapshot import HIDDEN
+from bt_actions.goals.policy import Busy
 from bt_actions.story.state import State
 from bt_actions.story.why import why
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
@@ -358,3 +361,132 @@ def test_a_reader_that_comes_late_is_told_of_the_tree_first() -> None:
     for event in late:
         state.observe(event)
     assert (state.status, state.actions[0].outcome) == (Status.SUCCESS, "SUCCEEDED")
+
+
+class TestWhatIsOdd:
+    def test_a_stop_while_the_tree_is_set_up_is_not_forgotten(self) -> None:
+        root = in_sequence(Does("d", lambda tick: None), name="root")
+        runner = VirtualRunner(root)
+        stream = runner._loop.teller.stream
+        root.setup = lambda **_: stream.add(StopWanted, "SIGINT", "interrupted by SIGINT")
+        runner.run()
+        assert runner.state.stop is not None
+        assert isinstance(runner.events[0], StopWanted)
+
+    def test_a_goal_of_an_earlier_run_does_not_stand_for_one_of_the_next(self) -> None:
+        network = VirtualNetwork()
+        script = Script(duration=lambda goal: goal.distance)
+        ScriptedServer(network, Move, "move_robot", script, faults=["move_robot:*:delay_cancel=3"])
+        far = iter((50.0, 9.0))
+        leaf = ActionBehaviour("m", Move, "move_robot", lambda: {"distance": next(far)})
+        leaf.busy = Busy.SHARE
+        runner = VirtualRunner(in_sequence(leaf), network)
+        runner.start()
+        runner.advance(1.0)
+        runner._loop.interrupt(runner.now, abandon=True)
+        runner.advance(0.1)
+        assert runner.run() is Status.SUCCESS
+        (action,) = runner.state.actions
+        assert (action.visits, action.outcome) == (1, "SUCCEEDED")
+
+    def test_a_reader_whose_poke_raises_is_let_go_of_and_nobody_else_suffers(self) -> None:
+        network = VirtualNetwork()
+        ScriptedServer(network, Move, "move_robot", Script(duration=1.0))
+        runner = VirtualRunner(MoveRobot("m", 1.0), network)
+        runner._loop.teller.stream.reader(poke=lambda: 1 / 0)
+        assert runner.run() is Status.SUCCESS
+
+    def test_what_is_pruned_is_told_of_and_let_go_of(self) -> None:
+        root = in_sequence(name="root")
+
+        def prune(tick: int) -> None:
+            if tick == 1:
+                root.remove_child(pruned)
+
+        pruned = Does("pruned", lambda tick: None)
+        root.add_children([Does("prunes", prune, ticks=3), pruned])
+        runner = VirtualRunner(root)
+        runner.run()
+        (removed,) = events_of(runner, NodesRemoved)
+        assert removed.nodes == (3,)
+        assert list(runner.state.nodes) == [1, 2]
+        assert pruned not in runner._loop.teller.numbers
+
+    def test_feedback_that_came_too_soon_is_told_when_its_time_has_come(self) -> None:
+        network = VirtualNetwork()
+        script = Script(duration=60.0)
+        faults = ["move_robot:1:stall=0.26"]
+        ScriptedServer(network, Move, "move_robot", script, faults=faults)
+        runner = VirtualRunner(in_sequence(MoveRobot("m", 1.0)), network, heartbeat=0.1)
+        runner.observe(lambda event: None)
+        runner.start()
+        runner.advance(20.0)
+        told = events_of(runner, FeedbackCame)
+        assert not runner._loop.goals._late
+        assert told[-1].at.steady < 5.0
+
+    def test_a_condition_says_what_stood_in_it(self, tmp_path: Any) -> None:
+        text = "tree: t\ninputs: {n: {type: int32, default: 2}}\nroot: {check: $n > 3 and 1 < 2}\n"
+        runner = VirtualRunner(tree(text, tmp_path))
+        runner.run()
+        assert any("$n > 3 and 1 < 2 is false: $n is 2" in line for line in why(runner.state))
+
+    def test_what_a_timeout_has_stopped_is_told(self, tmp_path: Any) -> None:
+        network = VirtualNetwork()
+        ScriptedServer(network, Move, "move_robot", Script(duration=60.0))
+        text = (
+            "tree: t\nroot:\n  timeout: T\n  after: 2 s\n  child:\n    action: Go\n"
+            "    type: robot_control_interfaces/action/MoveRobot\n    server: move_robot\n"
+            "    timeout: 90 s\n    goal: {distance: 7.0}\n"
+        )
+        runner = VirtualRunner(tree(text, tmp_path), network)
+        runner.run()
+        said = why(runner.state)
+        assert "not done within 2 s" in said[1]
+        assert said[2].startswith("  it stopped Go: CANCELED: ")
+        assert "goal {distance: 7.0}" in said[2]
+
+    def test_a_run_that_is_stopped_says_in_what(self) -> None:
+        network = VirtualNetwork()
+        ScriptedServer(network, Move, "move_robot", Script(duration=60.0))
+        runner = VirtualRunner(in_sequence(MoveRobot("m", 7.0), name="root"), network)
+        runner.start()
+        runner.advance(2.0)
+        runner._loop.teller.stream.add(StopWanted, "SIGINT", "interrupted by SIGINT")
+        runner.interrupt()
+        runner.advance(9.0)
+        said = why(runner.state)
+        assert said[0] == "stopped while it ran:"
+        assert said[1].endswith("  root / m")
+        assert "goal {distance: 7.0}" in said[2]
+
+
+class TestSecretsInWords:
+    @pytest.mark.parametrize(
+        "node",
+        [
+            "{timeout: T, after: $pin, child: {wait: 9 s}}",
+            "{for_each: F, in: '= [$pin]', as: x, child: {check: $x > 9999}}",
+            "{check: $pin > 9999}",
+            "{while: $pin > 9999, child: {success: S}}",
+            "{set: {code: = $pin + 1}}",
+        ],
+    )
+    def test_no_kind_of_node_tells_one(self, node: str, tmp_path: Any) -> None:
+        text = (
+            "tree: t\ninputs: {pin: {type: float64, secret: true}}\noutputs: {code: float64}\n"
+            f"root: {{sequence: S, children: [{{wait: 1 s}}, {node}]}}\n"
+        )
+        runner = VirtualRunner(tree(text, tmp_path, pin=0.7776))
+        runner.run()
+        lines = [to_line(event) for event in runner.events if not isinstance(event, RunBegan)]
+        assert not [line for line in lines if "7776" in line]
+
+    def test_what_never_read_one_is_told(self, tmp_path: Any) -> None:
+        text = (
+            "tree: t\ninputs: {pin: {type: string, secret: true}, n: {type: int32, default: 1}}\n"
+            "root: {sequence: S, children: [{set: {x: $pin}}, {wait: 1 s}, {check: $n > 3}]}\n"
+        )
+        runner = VirtualRunner(tree(text, tmp_path, pin="hunter2"))
+        runner.run()
+        assert any("$n > 3 is false" in line for line in why(runner.state))

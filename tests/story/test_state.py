@@ -220,7 +220,7 @@ ANOTHER_REASON_EACH_TIME = (
             "{invert: I, child: {fallback: F, children: [{failure: A}, {success: B}]}}",
             {"I": "success"},
         ),
-        ("{for_each: F, in: $l, as: m, child: {success: A}}", {"F": "item 1: m: 300 does"}),
+        ("{for_each: F, in: $l, as: m, child: {success: A}}", {"F": "item 2 of 2: m: 300 does"}),
         ("{subtree: sub.yaml, save: {m: z}}", {"sub": "m: 500 does not fit an int8"}),
         (ANOTHER_REASON_EACH_TIME, {"W": "the condition does not hold"}),
         (ANOTHER_EACH_TIME, {"A": ""}),

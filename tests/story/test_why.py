@@ -90,7 +90,7 @@ def test_a_night_of_forty_nodes_is_answered_in_a_few_lines() -> None:
     second = said[4]
     for part in (
         "Grasp, item 2 of 3 of Each station (3.0), failed after 3 attempts: UNEXPECTED_RESULT",
-        "expected result.stalled, and result.stalled is false",
+        "result.stalled is false; expected result.stalled",
         "goal {position: 0.0",
         "result {position: 0.0",
         "Hold the part (fallback) went on",

@@ -101,4 +101,6 @@ def _leaf(tree: str, server: str, inputs: dict[str, object], goal_name: str) -> 
         inputs_text(inputs)
     except ValueError as error:
         raise BadInput(f"--set: {error}") from error
-    return RunTree(tree, tree, inputs, server=server, goal_name=goal_name)
+    leaf = RunTree(tree, tree, inputs, server=server, goal_name=goal_name)
+    leaf.hides_goal = True  # its inputs are known to who gave them, and may be secrets there
+    return leaf

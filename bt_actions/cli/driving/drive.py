@@ -88,7 +88,7 @@ class Drive:
         """When the run was first asked to end."""
         self.abandoned = False
         """The user did not wait for the goals to end: threads are still running."""
-        self._lost = False
+        self._takes = self._lost = False
         """Whether something could not be shown."""
         self._watched = _pipe_of_stdout()
 
@@ -137,9 +137,14 @@ class Drive:
             self._signals.poke()
 
     def _take_events(self) -> None:
+        """Take in what has come, in order; what comes up meanwhile is taken by the same call."""
+        if self._takes:
+            return
+        self._takes = True
         while events := self._events.take():
             for event in events:
                 self._feed.event(event)
+        self._takes = False
 
     def _signalled(self, signal: Signal) -> None:
         if self._stopped_at is None:

@@ -72,7 +72,7 @@ class LineView(View):
         for key, (since, text) in list(self._passing.items()):
             if now - since >= LASTING:
                 del self._passing[key]
-                self._goal_line(since + LASTING, key, text)
+                self._goal_line(since + LASTING, key, f"{text}, for {LASTING:g} s")
 
     def _node(self, event: NodeChanged) -> None:
         story = self._state.nodes[event.node]

@@ -251,7 +251,7 @@ class LiveView(View):
 
     def _progress(self, now: float) -> Text:
         done, leaves = len(self._done), max(1, self._leaves)
-        elapsed = f"  {max(0.0, now - self._state.started):.1f} s"
+        elapsed = f"  {self._state.since_began(now):.1f} s"
         keys = f"  Ctrl-C {'again leaves' if self._stopping else 'cancels'}"
         counts = (f" {done} of {self._leaves} leaves", f" {done}/{self._leaves}", "")
         count = next(

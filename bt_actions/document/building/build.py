@@ -19,7 +19,7 @@ from py_trees.decorators import FailureIsSuccess, Inverter, OneShot, SuccessIsFa
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.decorators import Deadline, ForEach, Repeat, RetryChild, Subtree, While
-from bt_actions.behaviours.leaves import Check, Log, SetValues, Wait, WaitUntil
+from bt_actions.behaviours.leaves import Check, Log, SetValues, Wait, WaitUntil, stood_for
 from bt_actions.behaviours.parallel import Parallel
 from bt_actions.behaviours.reading import Names, Reading, of_result
 from bt_actions.behaviours.run_tree import CANCEL, RunTree, roots_of
@@ -176,7 +176,17 @@ def _for_each(node: TreeNode, context: Context) -> Behaviour:
 
 def _while(node: TreeNode, context: Context) -> Behaviour:
     name = node.name or plain_name(f"while {written_text(node)}")
-    return While(name, _child(node, context), context.holds(node.values["while"]))
+    written, holds = node.values["while"], context.holds(node.values["while"])
+    assert isinstance(written, Computed)
+
+    def condition() -> bool:
+        if holds():
+            return True
+        raise ValueError(
+            f"the condition does not hold{stood_for(written.expression, context.read)}"
+        )
+
+    return While(name, _child(node, context), condition)
 
 
 def _subtree(node: TreeNode, context: Context) -> Behaviour:

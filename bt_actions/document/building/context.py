@@ -20,7 +20,7 @@ from py_trees.blackboard import Blackboard, KeyMetaData
 
 from bt_actions.behaviours.reading import Formula, Names
 from bt_actions.behaviours.topics import TopicValue
-from bt_actions.behaviours.variables import hide, unhide, value_of, write
+from bt_actions.behaviours.variables import hide, is_hidden, unhide, value_of, write
 from bt_actions.document.language.classes import Python
 from bt_actions.document.language.types import parse_type
 from bt_actions.document.language.values import Computed, refuse_large, resolve
@@ -111,6 +111,10 @@ class Scope:
     def hide(self, names: Iterable[str]) -> None:
         """Have no event tell what these variables hold."""
         hide(map(self.key, names))
+
+    def hides(self, name: str) -> bool:
+        """Whether no event tells what a variable holds."""
+        return is_hidden(self.key(name))
 
     def clear(self, name: str) -> None:
         """Take a variable's value away, if it has one."""

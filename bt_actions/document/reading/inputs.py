@@ -155,4 +155,6 @@ def _fit(document: Document, name: str, value: object, text: str, *, types: bool
         refuse_infinite(value)
         return convert(value, text, types=types)
     except ValueError as error:
-        raise InputError(f"input {name!r} of {document.name!r}: {error}") from None
+        is_secret = document.inputs[name].values.get("secret") is True
+        said = f"it is secret, and no {text}" if is_secret else error
+        raise InputError(f"input {name!r} of {document.name!r}: {said}") from None
