@@ -21,7 +21,7 @@ from bt_actions.behaviours.reading import Reading
 from bt_actions.behaviours.variables import reads_variables, resolve
 from bt_actions.events.kinds import AttemptEnded
 from bt_actions.events.snapshot import HIDDEN
-from bt_actions.events.teller import here
+from bt_actions.events.teller import current_teller
 from bt_actions.goals.attempts import AttemptRecord, Attempts
 from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.messages.conversion import MessageError, fill
@@ -356,7 +356,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
 
     def _make_message(self) -> Any:
         action: Any = self.action_type
-        teller = here.get()
+        teller = current_teller.get()
         if teller is not None:
             teller.reads_secret = False  # whatever was read of the attempt before
         try:
@@ -387,7 +387,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
 
     def _tell(self, record: AttemptRecord, again_in: float | None) -> None:
         """Tell the run what was made of an attempt."""
-        if (teller := here.get()) is None or not teller.is_heard:
+        if (teller := current_teller.get()) is None or not teller.is_heard:
             return
         hides = bool(record.reason) and (
             teller.reads_secret

@@ -15,7 +15,7 @@ from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.connected import Timed
 from bt_actions.events.kinds import RoundBegan
 from bt_actions.events.snapshot import HIDDEN, snapshot
-from bt_actions.events.teller import here
+from bt_actions.events.teller import current_teller
 from bt_actions.goals.policy import Retry
 from bt_actions.utilities.plain_data import plain
 from bt_actions.utilities.shorten import shorten
@@ -76,7 +76,7 @@ class Gate(Timed, Decorator):
             self.feedback_message, self.refused = str(error), True
             return Status.FAILURE
         finally:
-            if (teller := here.get()) is not None and teller.has_news:
+            if (teller := current_teller.get()) is not None and teller.has_news:
                 self.reads_secret |= teller.reads_secret
                 teller.claim(self)
 
@@ -221,7 +221,7 @@ class Repeat(Gate):
             return Status.RUNNING
         if self._told != self._done:
             self._told = self._done
-            if (teller := here.get()) is not None and teller.is_heard:
+            if (teller := current_teller.get()) is not None and teller.is_heard:
                 self.reads_secret |= teller.reads_secret
                 hides = self.reads_secret
                 item = HIDDEN if hides and self.item is not None else snapshot(self.item)

@@ -13,7 +13,7 @@ from py_trees.common import Status
 from bt_actions.behaviours.connected import Leaf, Limited
 from bt_actions.events.kinds import Logged
 from bt_actions.events.snapshot import HIDDEN
-from bt_actions.events.teller import here
+from bt_actions.events.teller import current_teller
 from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.traffic.backend import LEVELS
@@ -117,7 +117,7 @@ class Log(Leaf):
             logging.getLogger("bt_actions").log(LEVELS[self._level], line)
         else:
             self._backend.log(self._level, line)
-        if (teller := here.get()) is not None:
+        if (teller := current_teller.get()) is not None:
             told = HIDDEN if teller.reads_secret else line
             teller.tell(Logged, self, self._level, told)
         return Status.SUCCESS

@@ -13,7 +13,7 @@ from typing import Any
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.variables import Var, resolve
-from bt_actions.events.teller import here
+from bt_actions.events.teller import current_teller
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.goals.policy import Outcome, Timeouts
 from bt_actions.messages.conversion import to_plain
@@ -62,7 +62,7 @@ class RunTree(ActionBehaviour):
         def goal() -> dict[str, object]:
             which = tree() if callable(tree) else resolve(tree)
             values = inputs() if callable(inputs) else resolve(inputs or {})
-            teller = here.get()
+            teller = current_teller.get()
             return {
                 "tree": which,
                 "inputs": inputs_text(values),

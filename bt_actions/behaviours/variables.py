@@ -13,7 +13,7 @@ from typing import Any
 
 from py_trees.blackboard import ActivityItem, ActivityStream, ActivityType, Blackboard
 
-from bt_actions.events.teller import here
+from bt_actions.events.teller import current_teller
 from bt_actions.utilities.plain_data import numbers_only
 
 
@@ -68,7 +68,7 @@ def value_of(key: str) -> Any:
 
     Raises KeyError where it has none.
     """
-    if key in _secret and (teller := here.get()) is not None:
+    if key in _secret and (teller := current_teller.get()) is not None:
         teller.reads_secret = True
     return Blackboard.storage[key]
 
@@ -97,7 +97,7 @@ def read(name: str) -> Any:
 def write(values: Mapping[str, object]) -> None:
     """Give variables their values, by their absolute keys, and tell the run of it."""
     Blackboard.storage.update(values)
-    if (teller := here.get()) is not None:
+    if (teller := current_teller.get()) is not None:
         if teller.reads_secret:
             hide(values)
         for name, value in values.items():
@@ -124,7 +124,7 @@ class _Overhearing(ActivityStream):
         """Take note of a client's activity (py_trees calls this)."""
         if self.before is not None:
             self.before.push(activity_item)
-        if (teller := here.get()) is None:
+        if (teller := current_teller.get()) is None:
             return
         teller.reads_secret |= activity_item.key in _secret
         if activity_item.activity_type in _WRITES:

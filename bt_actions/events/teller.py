@@ -1,7 +1,7 @@
 """Tells the stream of one runner what its nodes do: who they are by number, what they write.
 
-`here` is the teller of the run that ticks on this thread. A node of the tree asks for it, tells,
-and needs to know nothing of runs or readers.
+`current_teller` is that of the run that ticks on this thread. A node of the tree tells it, and
+needs to know nothing of runs or readers.
 """
 
 from __future__ import annotations
@@ -116,6 +116,6 @@ def _same(one: Value, other: Value) -> bool:
     return type(one) is type(other) and (one == other or (one != one and other != other))
 
 
-here: ContextVar[Teller | None] = ContextVar("here", default=None)
+current_teller: ContextVar[Teller | None] = ContextVar("current_teller", default=None)
 """The teller of the run that sets up, or ticks, a tree on this thread; None in a loop of the
 user's."""

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from bt_actions.events import FeedbackCame, GoalChanged, ServerSeen
 from bt_actions.events.snapshot import HIDDEN, snapshot
-from bt_actions.events.teller import OFTEN, Teller, here
+from bt_actions.events.teller import OFTEN, Teller, current_teller
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.terms import State
 from bt_actions.goals.unaccounted import GoalReport, report_of
@@ -47,11 +47,11 @@ class RunGoals:
 
     def begun_in(self, step: Callable[[], T]) -> T:
         """Return what `step` does; what it sets up and ticks is ours."""
-        before, teller = ticking_run.set(self._run), here.set(self._teller)
+        before, teller = ticking_run.set(self._run), current_teller.set(self._teller)
         try:
             return step()
         finally:
-            here.reset(teller)
+            current_teller.reset(teller)
             ticking_run.reset(before)
 
     @property
