@@ -50,6 +50,7 @@ def test_run_tree_is_asked_for_a_tree_by_its_name() -> None:
         "tree": "string",
         "inputs": "string",
         "goal_name": "string",
+        "caller_run": "string",
     }
 
 
