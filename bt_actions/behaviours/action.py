@@ -139,7 +139,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
     @property
     def attempt(self) -> int:
         """The number of the attempt of this visit, from 1; 0 before the first."""
-        under_way = self._handle is not None and not self._filed(self._handle)
+        under_way = self._handle is not None and not self._is_recorded(self._handle)
         return len(self.history) + under_way
 
     @property
@@ -168,7 +168,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         state, feedback, left, deadline = "IDLE", None, None, ""
         if backend is not None and handle is not None:
             now = backend.now()
-            if self.status is Status.RUNNING and self._filed(handle):
+            if self.status is Status.RUNNING and self._is_recorded(handle):
                 left = self._attempts.pause_left(now, look_only=True)
                 state, deadline = "BACKOFF", "backoff"
             else:
@@ -189,7 +189,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
 
     def due_in(self) -> float | None:
         """Return the seconds until this leaf needs a tick though nothing has happened."""
-        if self._backend is None or self._handle is None or not self._filed(self._handle):
+        if self._backend is None or self._handle is None or not self._is_recorded(self._handle):
             return None  # while a goal is open, traffic/driver.py applies its deadlines
         return self._attempts.pause_left(self._backend.now())
 
@@ -219,7 +219,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
 
     def initialise(self) -> None:
         """Begin a visit. Goals that an earlier visit left behind are drained beside it."""
-        backend, _ = self._there()
+        backend, _ = self._connection()
         ActionBehaviour.terminate(self, Status.INVALID)  # where the first tick of a visit broke off
         self._attempts = Attempts(self.retry, self._reading.when)
         self._outcome = None
@@ -227,14 +227,14 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
 
     def update(self) -> Status:
         """Take the goal as far as it goes at this moment; begins one attempt at most."""
-        backend, _ = self._there()
+        backend, _ = self._connection()
         if self._outcome is not None:
             self.initialise()  # shut down while RUNNING, and set up again: another visit
         handle = self._handle
         assert handle is not None
         begun = False
         while True:
-            if self._filed(handle):
+            if self._is_recorded(handle):
                 left = self._attempts.pause_left(backend.now())
                 if left > 0.0 or begun:
                     self.feedback_message = f"{self.reason}; again in {left:.1f} s"
@@ -264,7 +264,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         handle, backend = self._handle, self._backend
         if backend is None or handle is None:
             return
-        if not self._filed(handle):
+        if not self._is_recorded(handle):
             backend.traffic.interrupt(handle)
             outcome, reason = handle.goal.outcome, handle.goal.reason
             if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
@@ -295,8 +295,8 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
 
         Also those that a second server has taken when they had ended here.
         """
-        here = [] if self._own is None else self._own.handles
-        taken = [handle for handle in here if handle.owner is self]
+        open_there = [] if self._own is None else self._own.handles
+        taken = [handle for handle in open_there if handle.owner is self]
         ours = dict.fromkeys([*self._left_behind, self._handle, *taken])
         return [handle for handle in ours if handle is not None and not handle.is_over]
 
@@ -344,7 +344,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         """Return whether the user's code has ended the visit: by stop, or by shutdown."""
         return self._outcome is not None or self._backend is None
 
-    def _filed(self, handle: GoalHandle) -> bool:
+    def _is_recorded(self, handle: GoalHandle) -> bool:
         """Return whether this attempt is over and in the history."""
         history = self.history  # a new visit begins a new one
         return bool(history) and history[-1].goal is handle.goal
@@ -361,7 +361,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
             teller.reads_secret = False  # whatever was read of the attempt before
         try:
             data = resolve(self.goal() if callable(self.goal) else self.goal)
-            return fill(action.Goal, data, now=self._there()[0].stamp)
+            return fill(action.Goal, data, now=self._connection()[0].stamp)
         finally:
             reads = teller is not None and teller.reads_secret
             if (reads or self.hides_goal) and self._handle is not None:

@@ -37,7 +37,7 @@ class Connected(Generic[T]):
         """Make what it needs there."""
         raise NotImplementedError
 
-    def _there(self) -> tuple[Backend, T]:
+    def _connection(self) -> tuple[Backend, T]:
         """Return the node, and what it has there."""
         if self._backend is None or self._own is None:
             raise RuntimeError(f"{self.name}: not set up; call setup(node=node) before ticking")

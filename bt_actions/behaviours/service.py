@@ -80,7 +80,7 @@ class CallService(Connected[Service], Limited):
         return status
 
     def do(self) -> Status:
-        backend, client = self._there()
+        backend, client = self._connection()
         call = self._call
         if call is not None:
             if call.done():
@@ -134,5 +134,5 @@ class CallService(Connected[Service], Limited):
             self.feedback_message += f"; retry.when: {error.message}"
             return False
         self._pausing = True
-        self.give(self.retry.pause(self._tries, self._there()[0].randomness))
+        self.give(self.retry.pause(self._tries, self._connection()[0].randomness))
         return True

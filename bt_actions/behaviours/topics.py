@@ -139,13 +139,13 @@ class WaitForMessage(Connected[Subscription], Limited):
 
     def initialise(self) -> None:
         super().initialise()
-        self._there()
+        self._connection()
         self._came_before, self._wake = self._came, waker()
         # What a latched topic delivered before is as good as new
         self._kept = deque(self._newest if self._given[2] == "latched" else (), KEPT)
 
     def do(self) -> Status:
-        _, subscription = self._there()
+        _, subscription = self._connection()
         topic = subscription.name
         self.feedback_message = f"waiting for a message on {topic}"
         for _ in range(len(self._kept)):  # not what comes meanwhile: a tick must end
@@ -208,7 +208,7 @@ class Publish(Connected[Publisher], Limited):
         return backend.publisher(self._type, *self._given)
 
     def do(self) -> Status:
-        backend, publisher = self._there()
+        backend, publisher = self._connection()
         topic, listeners = publisher.name, publisher.listeners
         some_may_come = publisher.may_come() > 0.0
         if listeners < (self._subscribers or some_may_come):

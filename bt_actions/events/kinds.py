@@ -219,7 +219,7 @@ class StopWanted(Event):
     """SIGINT and the like, TIMEOUT (`--timeout`), SIGPIPE; of a served run CANCELED, HALTED, ..."""
     why: str
     """In words, to follow the status: ``interrupted by SIGINT``."""
-    leaves: bool = False
+    abandons: bool = False
     """Whether goals that are being drained are waited for no longer."""
 
 

@@ -15,7 +15,7 @@ from bt_actions.events.teller import OFTEN, Teller, current_teller
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.terms import State
 from bt_actions.goals.unaccounted import GoalReport, report_of
-from bt_actions.traffic.state import GoalHandle, Host, Run, ticking_run
+from bt_actions.traffic.state import GoalHandle, Host, RunListener, ticking_run
 
 T = TypeVar("T")
 
@@ -26,17 +26,18 @@ class RunGoals:
     def __init__(
         self,
         teller: Teller,
-        wake: Callable[[], None],
-        changed: Callable[[], None],
         host: Host,
+        *,
+        wake: Callable[[], None],
+        on_change: Callable[[], None],
     ) -> None:
         """`wake` is called where there is reason to tick.
 
-        `changed` is called, under the lock of the traffic, where one of ours has changed.
+        `on_change` is called, under the host's lock, where a goal of the tree has changed.
         """
-        self._teller, self._wake, self._changed = teller, wake, changed
+        self._teller, self._wake, self._on_change = teller, wake, on_change
         self._lock, self._steady = host.lock, host.steady
-        self._run = Run(self._note, self._feedback, self._sight)
+        self._run = RunListener(notify=self._note, feedback=self._feedback, sight=self._sight)
         self._handles: dict[GoalHandle, _Told] = {}  # in the order in which they began
         self._late: dict[GoalHandle, None] = {}
         """Those with feedback that was not told yet."""
@@ -106,7 +107,7 @@ class RunGoals:
             is_of_this_run = told.run_id == self._teller.run_id
             if self._teller.is_heard and is_of_this_run:
                 self._tell(handle, told)
-            self._changed()
+            self._on_change()
             may_be_sent = is_news and goal.state is State.WAITING_FOR_SERVER
             if not (self.is_watched or may_be_sent or goal.outcome is not None):
                 return  # its leaf would do nothing

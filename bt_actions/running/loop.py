@@ -92,13 +92,13 @@ class TickLoop:
         """Those whose observer is slow, as was said."""
         self.goals = RunGoals(
             self.teller,
-            wake,
-            lambda: self._traffic.host.scheduler.add(self.watchdog),
             self._traffic.host,
+            wake=wake,
+            on_change=lambda: self._traffic.host.scheduler.add(self.watchdog),
         )
         self.watchdog = Watchdog(self._traffic, self.goals)
         self._nodes = set[Behaviour]()  # of the tree, and set up
-        self._left = weakref.WeakSet[Behaviour]()  # set up, and not in the tree any more
+        self._pruned = weakref.WeakSet[Behaviour]()  # set up, and not in the tree any more
         self._with_children = dict[Behaviour, list[Behaviour]]()  # as they were set up
         self._doing = "setup"
         self._stop_wanted = self._abandoned = self._pause_wanted = self._paused = False
@@ -225,14 +225,14 @@ class TickLoop:
             by_itself = type(tree).setup is not BehaviourTree.setup and not self._nodes
             if by_itself:
                 tree.setup(timeout=Duration.INFINITE, node=self._node)  # and it does more than that
-            done = self._nodes | set(self._left)
+            done = self._nodes | set(self._pruned)
             for node in reversed(nodes):  # children before their parents, as `iterate` has them
                 if node not in done:
                     if not by_itself:
                         node.setup(node=self._node)
                     self._nodes.add(node)
             now = set(nodes)
-            self._left.update(self._nodes - now)
+            self._pruned.update(self._nodes - now)
             self._visitor.forget_others(now)
             self._nodes, self._with_children, self._doing = now, found, "tick"
             self.teller.added()
@@ -362,7 +362,7 @@ class TickLoop:
             return
         nodes = list(self.tree.root.iterate())
         ours = [each for each in nodes if isinstance(each, ActionBehaviour)]
-        left = {*self._nodes, *self._left}.difference(nodes)
+        left = {*self._nodes, *self._pruned}.difference(nodes)
         pruned = [each for each in left if root_of(each) in left]  # and is in no other tree
         for shutdown in self.tree.shutdown, *(each.shutdown for each in [*ours, *pruned]):
             try:  # ours must let go though another one raises

@@ -43,8 +43,10 @@ class TreeTeller(Teller):
     def __init__(self, tree: BehaviourTree, backend: Backend) -> None:
         self._tree, self._backend = tree, backend
         self._host = backend.traffic.host
-        self._has_begun = self._overhears = False
-        """Whether this run was told of, and what clients of the blackboard write is."""
+        self._has_begun = False
+        """Whether this run was told of."""
+        self._overhears = False
+        """Whether what clients of the blackboard write is told."""
         self._ros, self._last = 0.0, 0
         self._hidden: dict[Behaviour, str] = {}
         """The latest messages of nodes that had read a secret: their parents may take them over."""

@@ -123,7 +123,7 @@ class State:
         """What asked the run to end; the first counts."""
         self.stopped: list[Failure] = []
         """What ran when the run was asked to end."""
-        self.left = False
+        self.abandoned = False
         """Whether goals that are being drained are waited for no longer."""
         self.paused = False
         self.lost = 0
@@ -166,7 +166,7 @@ class State:
             case NodesRemoved():
                 self._remove(event.nodes)
             case RunBegan():
-                stop, left, servers = self.stop, self.left, self.servers
+                stop, abandoned, servers = self.stop, self.abandoned, self.servers
                 is_new = self.began is None or (
                     self.finished is not None
                     and stop is not None
@@ -174,7 +174,7 @@ class State:
                 )
                 self.__init__()  # type: ignore[misc]
                 if is_new:  # what came while the tree was set up
-                    self.stop, self.left, self.servers = stop, left, servers
+                    self.stop, self.abandoned, self.servers = stop, abandoned, servers
                 self.now, self.began = event.at, event
                 self._add(event.nodes)
                 self.root = event.nodes[0].id
@@ -182,7 +182,7 @@ class State:
                 if self.stop is None:
                     self.stop = event
                     self.stopped = [self._failure(each, each.message) for each in self.running]
-                self.left |= event.leaves
+                self.abandoned |= event.abandons
             case Paused():
                 self.paused = event.paused
             case EventsLost():
@@ -287,7 +287,7 @@ class State:
     # Asking
 
     def action(self, node: int) -> ActionStory:
-        """Return what an action leaf did, from its first event on."""
+        """Return what an action leaf did; a new story at its first event."""
         if node not in self._actions:
             of = self.nodes[node].node
             self._actions[node] = ActionStory(of, self.path(node), of.server)
@@ -417,7 +417,7 @@ class State:
             for goal in told
             if goal.goal_id not in last or last[goal.goal_id].end in (None, End.UNKNOWN)
         }
-        for action in self.actions if self.left else ():
+        for action in self.actions if self.abandoned else ():
             left = {each.goal_id: each.reason for each in action.given_up}
             left |= {key: f"{state.lower()} when left" for key, state in action.live.items()}
             for key, reason in left.items():

@@ -328,7 +328,7 @@ class GoalHandle:
     """The leaf; None where it is gone, and a second server has taken its goal, too."""
     name: str
     """The leaf's."""
-    run: Run | None = None
+    run: RunListener | None = None
     """Which run it belongs to: the last one that ticked its leaf; None where nobody said it."""
     attempt: int = 1
     keeps_feedback: bool = False
@@ -411,7 +411,7 @@ class Standing(NamedTuple):
 
 
 @dataclass(eq=False)
-class Run:
+class RunListener:
     """Who runs a tree, as its goals know it, which outlive both."""
 
     notify: Callable[[GoalHandle | None], None]
@@ -423,7 +423,7 @@ class Run:
     """Takes note, likewise, that the server of one of its goals has come in sight, or gone."""
 
 
-ticking_run: ContextVar[Run | None] = ContextVar("ticking_run", default=None)
+ticking_run: ContextVar[RunListener | None] = ContextVar("ticking_run", default=None)
 """Which run sets up, or ticks, a tree on this thread; None where nobody has said it, as in a loop
 of the user's."""
 
@@ -450,7 +450,7 @@ class Ended:
     busy: Busy
     owner: weakref.ref[Any] | None
     name: str
-    run: Run | None
+    run: RunListener | None
     attempt: int
     accepted: bool
     servers: frozenset[GID]

@@ -101,9 +101,9 @@ def test_a_goal_that_was_not_sent_is_not_live(leaf: FakeNode, story: Story) -> N
 def test_what_is_left_without_waiting_keeps_its_duration(leaf: FakeNode, story: Story) -> None:
     state = story.told(story.goal(leaf, "SENDING"), story.goal(leaf, "EXECUTING"))
     story.time += 5.0
-    left = StopWanted(story._next(), "again", "left without waiting", leaves=True)
+    left = StopWanted(story._next(), "again", "left without waiting", abandons=True)
     state.observe(left)
-    assert state.left
+    assert state.abandoned
     state.observe(RunEnded(left.at, 3, unaccounted=tuple(state.unaccounted)))
     action = only(state)
     assert (action.duration, action.outcome) == (pytest.approx(7.0), Outcome.CANCELED)
@@ -382,7 +382,7 @@ def test_the_state_keeps_what_was_told_of_variables_servers_pause_and_loss(story
 
 def test_the_first_wish_to_stop_counts_and_a_later_one_may_leave(story: Story) -> None:
     state = story.told(StopWanted(story._next(), "SIGINT", "interrupted by SIGINT"))
-    assert not state.left
-    state.observe(StopWanted(story._next(), "again", "left without waiting", leaves=True))
+    assert not state.abandoned
+    state.observe(StopWanted(story._next(), "again", "left without waiting", abandons=True))
     assert state.stop is not None
-    assert (state.stop.who, state.left) == ("SIGINT", True)
+    assert (state.stop.who, state.abandoned) == ("SIGINT", True)

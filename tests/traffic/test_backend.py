@@ -13,7 +13,7 @@ from std_srvs.srv import SetBool, Trigger
 from bt_actions.messages.interfaces import TwoTypes
 from bt_actions.testing import VirtualBackend, VirtualNetwork
 from bt_actions.traffic.backend import Backend
-from bt_actions.traffic.state import Run, ticking_run
+from bt_actions.traffic.state import RunListener, ticking_run
 from bt_actions.wiring import backend_of
 from tests.support.waiting import until
 
@@ -147,7 +147,7 @@ def name() -> str:
 def told(world: World) -> Iterator[list[Any]]:
     """What who runs a tree here is told; None is a wake-up."""
     told: list[Any] = []
-    before = ticking_run.set(Run(told.append))
+    before = ticking_run.set(RunListener(told.append))
     yield told
     ticking_run.reset(before)
 

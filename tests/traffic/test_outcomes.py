@@ -21,7 +21,7 @@ from bt_actions.events import GoalChanged
 from bt_actions.testing import VirtualBackend
 from bt_actions.testing.transport import VirtualParticipant
 from bt_actions.traffic import handover, watcher
-from bt_actions.traffic.state import GoalHandle, Run
+from bt_actions.traffic.state import GoalHandle, RunListener
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.virtual import World
 
@@ -684,7 +684,7 @@ def test_all_that_a_goal_has_decided_is_done_before_what_follows_for_the_next(wo
         if changed is not None:
             there.append([each.name for each in changed.endpoint.handles])
 
-    waits.run = Run(note)
+    waits.run = RunListener(note)
     while not there:
         world.network.timeline.advance(world.network.now() + 0.05)
     assert there == [["second"]]

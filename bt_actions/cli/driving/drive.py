@@ -193,7 +193,7 @@ class Drive:
                 break
             self._signals.wait(min(left, SAME_WISH))
             self._take_events()
-        self._runner.stream.add(StopWanted, "again", "left without waiting", leaves=True)
+        self._runner.stream.add(StopWanted, "again", "left without waiting", abandons=True)
         self._take_events()
 
     def _await_readers(self) -> None:
@@ -254,7 +254,7 @@ class Drive:
 
 def code_of(state: State, *, raised: bool = False, complaint: str = "") -> Exit:
     """Return the exit code of a run; `raised`: it could not even be begun, or drained."""
-    if state.unaccounted or (state.left and state.finished is None):
+    if state.unaccounted or (state.abandoned and state.finished is None):
         return Exit.UNKNOWN
     if state.stop is not None:
         return Exit.__members__.get(state.stop.who, Exit.FAILURE)
@@ -268,7 +268,7 @@ def cause_of(state: State) -> str:
     """Say why a run did not end by itself, or ""."""
     if state.stop is None:
         return ""
-    return f"{state.stop.why}{', left without waiting' if state.left else ''}"
+    return f"{state.stop.why}{', left without waiting' if state.abandoned else ''}"
 
 
 def _pipe_of_stdout() -> int:

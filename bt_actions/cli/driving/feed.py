@@ -6,7 +6,6 @@ lasts is shown as things stood then, however late the event is read.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import partial
 
@@ -31,7 +30,9 @@ class Feed:
         """`show` is given each call of the view, to guard it."""
         self.state, self.view, self._show = state, view, show
         self._waits_since: float | None = None
-        """When the tree was first known to have ended; NaN once it is said what is waited for."""
+        """When the tree was first known to have ended."""
+        self._has_said = False
+        """Whether it was said what is waited for."""
 
     def event(self, event: Event) -> None:
         """Take in an event, and show it."""
@@ -48,11 +49,12 @@ class Feed:
         """Let the time until `now` pass."""
         self._show(partial(self.view.due, now))
         state = self.state
-        if not state.decided or state.finished is not None or state.stop is not None:
+        over = state.finished is not None or state.stop is not None
+        if self._has_said or over or not state.decided:
             return
         if self._waits_since is None:
             since = state.nodes[state.root].since
             self._waits_since = now if since is None else since.steady
         if now - self._waits_since >= SOON and (text := waiting_text(state)):
-            self._waits_since = math.nan
+            self._has_said = True
             self._show(lambda: self.view.say(f"{text}; Ctrl-C twice leaves without waiting"))

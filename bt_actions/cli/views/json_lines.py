@@ -85,7 +85,7 @@ class JsonView(View):
             case RoundBegan():
                 self._of(event, event.node, "round", round=event.number, of=event.of,
                          item=plain(event.item))  # fmt: skip
-            case StopWanted(leaves=False):
+            case StopWanted(abandons=False):
                 self.say(stopping_text(self._state))
 
     def say(self, text: str) -> None:

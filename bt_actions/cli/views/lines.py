@@ -61,7 +61,7 @@ class LineView(View):
             case RoundBegan():
                 for node in below(self._state, event.node):
                     self._nodes.pop(node, None)
-            case StopWanted(leaves=False):
+            case StopWanted(abandons=False):
                 self._write(stopping_text(self._state))
             case TreeFinished():
                 for key in list(self._held):

@@ -101,7 +101,7 @@ class LiveView(View):
             case RoundBegan():
                 for node in below(self._state, event.node):
                     self._last.pop(node, None)
-            case StopWanted(leaves=False):
+            case StopWanted(abandons=False):
                 self.say(stopping_text(self._state))
 
     def _node_changed(self, event: NodeChanged) -> None:

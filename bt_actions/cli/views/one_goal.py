@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TextIO
 
 from bt_actions.cli.views.view import View
@@ -28,7 +29,7 @@ class GoalView(View):
 
     def event(self, event: Event) -> None:
         """Write where the goal stands, when that has changed."""
-        if isinstance(event, StopWanted) and not event.leaves:
+        if isinstance(event, StopWanted) and not event.abandons:
             self._line(stopping_text(self._state))
         if not isinstance(event, GoalChanged) or event.outcome is not None:
             return
@@ -57,11 +58,11 @@ class GoalView(View):
             for line in self.result_lines(action):
                 self._line(line)
         for action in state.actions:
-            if action.latest is not None:
-                action.reason = action.latest.latest.reason  # the result was told above
+            reason = action.latest.latest.reason if action.latest is not None else ""
             if ended.cause and action.outcome is Outcome.CANCELED:
-                action.reason = ended.cause  # here is no tree that could have interrupted it
-            self._line(f"{goal_text(action)}, after {action.seconds(state.latest):.2f} s")
+                reason = ended.cause  # here is no tree that could have interrupted it
+            told = goal_text(replace(action, reason=reason))  # the result was told above
+            self._line(f"{told}, after {action.seconds(state.latest):.2f} s")
         for line in left_open(state):
             self._line(line)
 

@@ -236,23 +236,23 @@ def _writes(document: Document, nodes: Iterable[TreeNode]) -> set[str]:
 def _action(node: TreeNode, context: Context) -> Behaviour:
     """The behaviour of an action, by its name in the document or in place."""
     settings = settings_of(node, context.document)
-    says_more = len(node.values) - ("goal" in node.values) - ("save" in node.values) > 1
-    terms = None if says_more else context.terms.get(node.alias)
-    if terms is None:
-        terms = {
+    overrides_alias = len(node.values) - ("goal" in node.values) - ("save" in node.values) > 1
+    shared = None if overrides_alias else context.shared.get(node.alias)
+    if shared is None:
+        shared = {
             "action_type": _interface(settings["type"], "action", context),
             "action_name": context.name(settings, "server"),
-            **_terms(settings, context, of_result),
+            **_shared_settings(settings, context, of_result),
         }
-        if not says_more:
-            context.terms[node.alias] = terms
+        if not overrides_alias:
+            context.shared[node.alias] = shared
     goal = settings.get("goal", {})
-    result = terms["action_type"].Result if context.types else None
+    result = shared["action_type"].Result if context.types else None
     return ActionBehaviour(
         node.name,
         goal=context.value(goal) if computed_in(goal) else goal,
         save=context.saved(settings.get("save"), of_result, result),
-        **terms,
+        **shared,
     )
 
 
@@ -264,11 +264,11 @@ def _run_tree(node: TreeNode, context: Context) -> Behaviour:
         context.value(settings.get("inputs", {})),
         server=context.joined(settings, server_of(settings)),
         save=context.saved(settings.get("save"), roots_of),
-        **_terms(settings, context, roots_of, {"cancel": CANCEL}),
+        **_shared_settings(settings, context, roots_of, {"cancel": CANCEL}),
     )
 
 
-def _terms(
+def _shared_settings(
     settings: Mapping[str, object],
     context: Context,
     names: Names,

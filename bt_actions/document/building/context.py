@@ -137,7 +137,7 @@ class Context:
     python: Python = True
     """Which ``python:`` nodes may be made."""
     once: bool = False
-    terms: dict[str | None, dict[str, Any]] = field(default_factory=dict)
+    shared: dict[str | None, dict[str, Any]] = field(default_factory=dict)
     """By actions: what their nodes have in common that say but a goal and a `save` of their own."""
 
     def read(self, name: str) -> object:
