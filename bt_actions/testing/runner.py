@@ -14,8 +14,10 @@ from py_trees.trees import BehaviourTree
 from bt_actions.events import AttemptEnded
 from bt_actions.running.loop import TickLoop
 from bt_actions.story.state import State
+from bt_actions.story.why import causes
 from bt_actions.testing.backend import VirtualBackend
 from bt_actions.testing.network import VirtualNetwork
+from bt_actions.utilities.shorten import fit
 from bt_actions.utilities.stepping import Done, Sleep
 
 if TYPE_CHECKING:
@@ -66,7 +68,9 @@ class VirtualRunner:
         self._loop.observe(self._note)
 
     def __repr__(self) -> str:
-        return f"<VirtualRunner of {self.tree.root.name!r} at {self.now:g} s>"
+        """Tell why the run failed, too: pytest prints it where an assertion fails."""
+        why = fit("; ".join(causes(self.state)), 150)
+        return f"<VirtualRunner of {self.tree.root.name!r} at {self.now:g} s{why and f': {why}'}>"
 
     @property
     def now(self) -> float:

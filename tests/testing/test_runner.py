@@ -99,3 +99,11 @@ def test_what_is_no_backend_and_what_is_no_network_is_told() -> None:
         MoveRobot("move", 1.0).setup(node=network)
     with pytest.raises(TypeError, match="no VirtualNetwork"):
         VirtualRunner(MoveRobot("move", 1.0), ScriptedServer(network, Move, "move_robot"))  # type: ignore[arg-type]
+
+
+def test_a_failed_assertion_prints_why_the_run_failed() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, Move, "move_robot", faults=["move_robot:1:abort"])
+    runner = VirtualRunner(MoveRobot("To the shelf", 2.0), network)
+    assert runner.run() is Status.FAILURE
+    assert "To the shelf: ABORTED: aborted by /move_robot; goal {distance: 2.0}" in repr(runner)
