@@ -13,6 +13,7 @@ from typing import Any
 
 from py_trees.blackboard import ActivityItem, ActivityStream, ActivityType, Blackboard
 
+from bt_actions.events.snapshot import HIDDEN
 from bt_actions.events.teller import current_teller
 from bt_actions.utilities.plain_data import numbers_only
 
@@ -101,7 +102,7 @@ def write(values: Mapping[str, object]) -> None:
         if teller.reads_secret:
             hide(values)
         for name, value in values.items():
-            teller.wrote(name, value)
+            teller.wrote(name, HIDDEN if name in _secret else value)
 
 
 _WRITES = (ActivityType.WRITE.value, ActivityType.INITIALISED.value)
@@ -130,7 +131,8 @@ class _Overhearing(ActivityStream):
         if activity_item.activity_type in _WRITES:
             if teller.reads_secret:
                 hide([activity_item.key])
-            teller.wrote(activity_item.key, activity_item.current_value)
+            is_told = activity_item.key not in _secret
+            teller.wrote(activity_item.key, activity_item.current_value if is_told else HIDDEN)
 
 
 _overhearing = threading.Lock()

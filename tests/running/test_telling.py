@@ -232,22 +232,37 @@ class TestVariables:
         client = py_trees.blackboard.Client(name="mine")
         client.register_key("speed", access=Access.WRITE)
 
-        def write(tick: int) -> None:
-            client.speed = tick // 2
+        class Writes(Does):
+            def update(self) -> Status:
+                self._seen += 1
+                client.speed = self._seen // 2
+                return Status.FAILURE if self._seen == 34 else Status.RUNNING
 
-        def fail(tick: int) -> None:
-            leaf.update = lambda: Status.FAILURE  # type: ignore[method-assign]
-
-        leaf = Does("writes", lambda tick: write(tick) or (tick == 30 and fail(tick)), ticks=99)
-        runner = VirtualRunner(in_sequence(leaf), heartbeat=0.05)
+        runner = VirtualRunner(in_sequence(Writes("writes", print)), heartbeat=0.05)
         runner.run()
         told = events_of(runner, VariableWritten)
         values = [e.value for e in told]
-        assert values[-1] == 15
+        assert values[-1] == 17
         assert values == sorted(set(values))
-        assert len(values) <= 10
+        assert len(values) <= 11
         failed = next(e for e in runner.events if getattr(e, "status", None) is Status.FAILURE)
         assert told[-1].at.number < failed.at.number
+
+    def test_that_a_leaf_writes_while_it_runs_are_told_at_once_and_as_its_own(self) -> None:
+        client = py_trees.blackboard.Client(name="mine")
+        client.register_key("speed", access=Access.WRITE)
+
+        def write(tick: int) -> None:
+            client.speed = tick
+
+        policy = py_trees.common.ParallelPolicy.SuccessOnAll(synchronise=False)
+        writer, other = Does("writes", write, ticks=40), Does("other", lambda tick: None, ticks=41)
+        root = py_trees.composites.Parallel("p", policy, children=[writer, other])
+        runner = VirtualRunner(root, heartbeat=0.1)
+        runner.run()
+        told = events_of(runner, VariableWritten)
+        assert {e.node for e in told} == {2}
+        assert len(told) > 10
 
     def test_of_two_runs_are_not_mixed_up(self) -> None:
         client = py_trees.blackboard.Client(name="mine")
@@ -388,6 +403,10 @@ class TestWhatIsOdd:
         assert runner.run() is Status.SUCCESS
         (action,) = runner.state.actions
         assert (action.visits, action.outcome) == (1, "SUCCEEDED")
+        began = [at for at, event in enumerate(runner.events) if isinstance(event, RunBegan)]
+        goals = [event.goal_id for event in runner.events if isinstance(event, GoalChanged)]
+        later = runner.events[began[1] :]
+        assert goals[0] not in [e.goal_id for e in later if isinstance(e, GoalChanged)]
 
     def test_a_reader_whose_poke_raises_is_let_go_of_and_nobody_else_suffers(self) -> None:
         network = VirtualNetwork()
@@ -415,7 +434,7 @@ class TestWhatIsOdd:
     def test_feedback_that_came_too_soon_is_told_when_its_time_has_come(self) -> None:
         network = VirtualNetwork()
         script = Script(duration=60.0)
-        faults = ["move_robot:1:stall=0.26"]
+        faults = ["move_robot:1:stall=0.4"]
         ScriptedServer(network, Move, "move_robot", script, faults=faults)
         runner = VirtualRunner(in_sequence(MoveRobot("m", 1.0)), network, heartbeat=0.1)
         runner.observe(lambda event: None)
@@ -490,3 +509,14 @@ class TestSecretsInWords:
         runner = VirtualRunner(tree(text, tmp_path, pin="hunter2"))
         runner.run()
         assert any("$n > 3 is false" in line for line in why(runner.state))
+
+    def test_what_a_parent_takes_over_is_hidden_there_too(self, tmp_path: Any) -> None:
+        inner = (
+            "tree: inner\ninputs: {pin: {type: string, secret: true, default: hunter2}}\n"
+            "root: {check: $pin == 'x'}\n"
+        )
+        (tmp_path / "inner.yaml").write_text(inner)
+        runner = VirtualRunner(tree("tree: t\nroot: {subtree: inner.yaml}\n", tmp_path))
+        runner.run()
+        lines = [to_line(event) for event in runner.events if not isinstance(event, RunBegan)]
+        assert not [line for line in lines if "hunter2" in line]
