@@ -544,7 +544,7 @@ def test_goals_over_their_deadline_at_a_server_that_answers_wrong(
     goes_on = fault in ("reject_cancel", "drop_cancel", "ignore_cancel")
     assert all((each > TOO_LONG - 0.1) is goes_on for each in lasted), lasted
     if fault == "delay_result=0.5":
-        known = [event.time - events[goal][ends[goal]] for goal, event in report.goals.items()]
+        known = [event.at.steady - events[goal][ends[goal]] for goal, event in report.goals.items()]
         assert min(known) > 0.4, known
     counted = Counter(ends.values())
     record.outcome = (

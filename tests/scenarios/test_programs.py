@@ -414,7 +414,7 @@ def test_who_was_stopped_beyond_its_lease_and_is_not_heard_any_more_finds_anothe
 LOOKS_OUT = """
     def told(event):
         said(event)
-        if getattr(event, "outcome", None) is not None:
+        if type(event).__name__ == "GoalChanged" and event.outcome is not None:
             print(event.outcome, event.end, flush=True)
     leaf = MoveRobot("m", 40.0, action_name=name, timeout=T)
     with TreeRunner(leaf) as runner:
