@@ -124,9 +124,9 @@ def _told(failure: Failure, state: State) -> Iterator[str]:
         if each.action is not None and each.attempts:
             said = attempt_text(each.action, each.attempts[-1])
         yield clean(f"  it stopped {each.node.name}{f': {said}' if said else ''}")
-    passed = ", ".join(
-        f"{above.node.name} ({above.node.kind})" for above in state.above(failure.node.id)
-    )
+    failed = state.status is Status.FAILURE
+    holders = state.above(failure.node.id) if failed else ()
+    passed = ", ".join(f"{above.node.name} ({above.node.kind})" for above in holders)
     place = failure.place or f"{failure.node.name} ({failure.node.kind})"
     yield clean(f"  {place}{f'; passed on by {passed}' if passed else ''}")
 

@@ -87,7 +87,9 @@ def test_a_signal_in_mid_motion_cancels_the_goal_within_the_deadline_and_leaves_
     assert not any("Traceback" in line for line in run.errors), run
     assert marked(mark) == []
     if how != "--json":
-        assert run.lines[-1].endswith(f"interrupted by {number.name}")
+        (ended,) = [line for line in run.lines if line.startswith("STOPPED after")]
+        assert ended.endswith(f"interrupted by {number.name}")
+        assert "stopped while it ran:" in run.lines[run.lines.index(ended) :]
 
 
 def test_a_signal_before_anything_was_sent_ends_the_run_too(

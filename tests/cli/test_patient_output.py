@@ -116,7 +116,9 @@ def test_what_ends_a_run_cancels_its_goal_though_nobody_reads(
         assert in_order(lines, '"started"', '"SENDING"', cause, '"CANCELED"', '"finished"')
     else:
         assert in_order(lines, "RUNNING  Work", f"{cause}", "CANCELED", "STOPPED after")
-    assert "finished" in lines[-1] or "STOPPED after" in lines[-1]
+    last = [line for line in lines if "finished" in line or "STOPPED after" in line]
+    assert last
+    assert "executing" not in "".join(lines[lines.index(last[-1]) :]), "the report comes last"
 
 
 def test_a_signal_ends_the_wait_for_a_reader(
