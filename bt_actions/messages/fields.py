@@ -8,12 +8,12 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 from bt_actions.messages.interfaces import short_name
 from bt_actions.utilities.plain_data import scalar
-from bt_actions.utilities.shorten import fit
+from bt_actions.utilities.shorten import scalars
 from bt_actions.utilities.suggest import what_it_has
 
 _BITS = (8, 16, 32, 64)
@@ -104,20 +104,12 @@ def constant_name(message: object, field: str, value: int) -> str:
     return str(value)
 
 
-def fields_in_words(message: object, most: int = 4) -> str:
+def fields_in_words(message: object) -> str:
     """Return the first scalar fields of a ROS message: names, values, constants by their name."""
-    parts: list[str] = []
-    for field in getattr(message, "get_fields_and_field_types", dict[str, str])():
-        value = getattr(message, field)
-        if isinstance(value, float):
-            parts.append(f"{field} {value:.2f}")
-        elif isinstance(value, str):
-            parts.append(f"{field} {fit(value, 80)}")
-        elif isinstance(value, bool):
-            parts.append(f"{field} {str(value).lower()}")
-        elif isinstance(value, int):
-            parts.append(f"{field} {constant_name(message, field, value)}")
-    return ", ".join(parts[:most])
+    fields = getattr(message, "get_fields_and_field_types", dict[str, str])()
+    return scalars(
+        ((field, getattr(message, field)) for field in fields), partial(constant_name, message)
+    )
 
 
 def _type(slot: Any) -> FieldType:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 from bt_actions.events.snapshot import Cut, Value
 from bt_actions.story.actions import ActionStory
-from bt_actions.utilities.shorten import fit
+from bt_actions.utilities.shorten import scalars
 
 Constants = Mapping[str, Value]
 """By field the names of numbers."""
@@ -25,21 +26,16 @@ def constants_of(action: ActionStory, message: str) -> Constants:
     return found if isinstance(found, dict) else {}
 
 
-def fields_text(message: Value, constants: Constants, most: int = 4) -> str:
+def fields_text(message: Value, constants: Constants) -> str:
     """Return the first scalar fields of a message: names, values, constants by their name."""
-    parts: list[str] = []
-    for field, value in opened(message).items():
-        if isinstance(value, Cut) and isinstance(value.head, str):
-            value = f"{value.head}…"
-        if isinstance(value, float):
-            parts.append(f"{field} {value:.2f}")
-        elif isinstance(value, str):
-            parts.append(f"{field} {fit(value, 80)}")
-        elif isinstance(value, bool):
-            parts.append(f"{field} {str(value).lower()}")
-        elif isinstance(value, int):
-            parts.append(f"{field} {named(constants, field, value)}")
-    return ", ".join(parts[:most])
+    fields = (
+        (
+            field,
+            f"{value.head}…" if isinstance(value, Cut) and isinstance(value.head, str) else value,
+        )
+        for field, value in opened(message).items()
+    )
+    return scalars(fields, partial(named, constants))
 
 
 def opened(message: Value) -> dict[str, Value]:

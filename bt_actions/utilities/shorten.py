@@ -6,7 +6,7 @@ No ROS here: a message is recognised by what it can do, and what was cut (events
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from bt_actions.utilities.plain_data import field_of, item_of, scalar
 
@@ -26,6 +26,24 @@ Part = tuple[str, object]
 def brief(value: object) -> str:
     """Return a value as people read it, short however large it is; a text without quotes."""
     return fit(value, LONG) if isinstance(value, str) else shorten(value, LONG)
+
+
+def scalars(fields: Iterable[tuple[str, object]], named: Callable[[str, int], str]) -> str:
+    """Return the first four scalar fields as ``position 0.25, status FAULT``.
+
+    `named` gives the text of a whole number: the name of its constant, where the field has one.
+    """
+    parts: list[str] = []
+    for field, value in fields:
+        if isinstance(value, float):
+            parts.append(f"{field} {value:.2f}")
+        elif isinstance(value, str):
+            parts.append(f"{field} {fit(value, 80)}")
+        elif isinstance(value, bool):
+            parts.append(f"{field} {str(value).lower()}")
+        elif isinstance(value, int):
+            parts.append(f"{field} {named(field, value)}")
+    return ", ".join(parts[:4])
 
 
 def shorten(value: object, limit: int = MESSAGE) -> str:
