@@ -83,12 +83,13 @@ class ChangeVisitor(VisitorBase):
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
         self._kinds = {Behaviour}  # of what was visited: anything, for a tree that shows nothing
-        self._known: dict[Behaviour, Status] = {}
+        self._known: dict[Behaviour, Status] = {}  # at the last tick of each
         self._live: dict[Behaviour, None] = {}  # told of as RUNNING
+        self._changed = False
 
     def initialise(self) -> None:
         """Begin a tick (py_trees calls this)."""
-        self._visited = []
+        self._visited, self._changed = [], False
         self._before()
 
     def run(self, behaviour: Behaviour) -> None:
@@ -103,6 +104,7 @@ class ChangeVisitor(VisitorBase):
         """
         after_each, visited, none = self._after_each, self._visited, Status.INVALID
         live, running, tell, settle = self._live, Status.RUNNING, self._tell, self._settle
+        known = self._known
         for behaviour in ticked:
             for visitor in others:
                 behaviour.visit(visitor)
@@ -115,9 +117,12 @@ class ChangeVisitor(VisitorBase):
             visited.append(behaviour)
             if status is not running:
                 live.pop(behaviour, None)
+                if known.get(behaviour) is not status:
+                    known[behaviour], self._changed = status, True
                 tell(behaviour)
             elif behaviour not in live:
                 live[behaviour] = None
+                known[behaviour], self._changed = status, True
                 tell(behaviour)
             else:
                 settle(behaviour)
@@ -126,39 +131,23 @@ class ChangeVisitor(VisitorBase):
 
     def forget_others(self, tree: set[Behaviour]) -> None:
         """Forget what is in the tree no more, unless its end has still to be told."""
-        self._known = {
-            node: status
-            for node, status in self._known.items()
-            if node in tree or status is Status.RUNNING
-        }
+        self._known = {node: status for node, status in self._known.items() if node in tree}
 
-    def finish(self) -> dict[Behaviour, Status]:
-        """Return the changes of a tick, also of one that raised: what it visited and stopped."""
-        visited, before = self._visited, self._visited_before
-        stopped = []
-        if visited != before:
-            seen, known = set(visited), self._known
-            stopped = [n for n in before if n not in seen and known.get(n) is Status.RUNNING]
-            self._kinds = {type(node) for node in visited}
-            self._visited_before = visited
-        self._tell_stopped()
-        return self._changes(stopped + visited)
+    def finish(self) -> bool:
+        """Return whether a tick, also one that raised, has changed a status."""
+        if self._visited != self._visited_before:
+            self._kinds = {type(node) for node in self._visited}
+            self._visited_before = self._visited
+        self.stopped()
+        return self._changed
 
-    def stopped(self) -> dict[Behaviour, Status]:
-        """Return the changes of what was last known to run."""
-        self._tell_stopped()
-        return self._changes([n for n, s in self._known.items() if s is Status.RUNNING])
-
-    def _tell_stopped(self) -> None:
+    def stopped(self) -> None:
+        """Tell of what runs no more though it was not ticked."""
         for node in [each for each in self._live if each.status is not Status.RUNNING]:
             del self._live[node]
+            self._known.pop(node, None)
+            self._changed = True
             self._tell(node)
-
-    def _changes(self, nodes: list[Behaviour]) -> dict[Behaviour, Status]:
-        known = self._known
-        changes = {node: node.status for node in nodes if known.get(node) is not node.status}
-        known |= changes
-        return changes
 
     @property
     def watching(self) -> bool:
