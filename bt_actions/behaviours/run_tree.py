@@ -30,7 +30,7 @@ class RunTree(ActionBehaviour):
     """Has a tree run by a server of trees (`bt-actions serve`), and takes over how it ends.
 
     Where the server cannot account for every goal of the run, the end is UNKNOWN here, too,
-    whatever the status. A run that failed tells its chain of failures as the reason.
+    whatever the status. A run that failed tells its root cause as the reason.
 
     Args:
         name: as in py_trees.
@@ -85,10 +85,10 @@ class RunTree(ActionBehaviour):
         return result is not None and bool(result.settled)
 
     def explain(self, outcome: Outcome, result: Any) -> str:
-        """Return the run's chain of failures; or where the reason of a rejection is told."""
+        """Return the run's root cause; or where the reason of a rejection is told."""
         if outcome is Outcome.REJECTED:
             return "its log, and its topic ~/rejections, say why"
-        return "; ".join(result.error_msg.splitlines()) if result is not None else ""
+        return result.error_msg.partition("\n")[0] if result is not None else ""
 
     def _begin(self, backend: Backend) -> GoalHandle:
         handle = super()._begin(backend)

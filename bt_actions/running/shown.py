@@ -16,8 +16,8 @@ from bt_actions.document import given_inputs
 from bt_actions.document.language.types import parse_type
 from bt_actions.events import Event, RunBegan
 from bt_actions.story.state import State
-from bt_actions.story.why import causes
-from bt_actions.story.words import begins_text
+from bt_actions.story.why import why_text
+from bt_actions.story.words import begins_text, verdict
 from bt_actions.utilities.plain_text import in_words
 
 if TYPE_CHECKING:
@@ -64,15 +64,16 @@ class ShownRun:
             self._rosout.close()
             return
         state, name = self._state, self._state.tree
-        failed = "\n".join(causes(state)) if error is None else in_words(error)
+        failed = "" if error is None else in_words(error)
+        if state.status is Status.FAILURE:
+            failed = why_text(state)
         if failed:
             self._rosout.say("error", f"{name}: {failed}")
-        word = state.status.value if state.status is not Status.INVALID else "STOPPED"
         unaccounted = self._runner.unaccounted
         for goal in unaccounted:
             self._rosout.say("error", f"{name}: not accounted for: {goal}")
-        text = f"{name} ends: {word} after {state.elapsed:.2f} s"
+        text = f"{name} ends: {verdict(state.status, state.elapsed)}"
         text += ", left without waiting for its goals" if left else ""
-        wrong = left or unaccounted or failed or state.status is Status.FAILURE
+        wrong = left or unaccounted or failed
         self._rosout.say("error" if wrong else "info", text)
         self._rosout.close()

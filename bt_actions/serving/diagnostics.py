@@ -41,7 +41,7 @@ def judge(standing: Standing, refuses: str) -> tuple[bytes, str]:
     if last is not None and not last.settled:
         return ERROR, f"the last run is not settled: {last.unaccounted[0]} may still be running"
     if last is not None and not last.as_wanted and not running:
-        return WARN, f"the last run failed: {last.message.partition(chr(10))[0]}"
+        return WARN, f"the last run failed: {last.why.partition(chr(10))[0]}"
     if standing.paused:
         return WARN, "paused"
     if standing.retrying:

@@ -1,4 +1,4 @@
-"""How a run is told to others: codes, the chain of failures, a report for each action. No ROS.
+"""How a run is told to others: codes, why it failed, a report for each action. No ROS.
 
 The numbers are those of bt_actions_interfaces (RunTree.action, ActionReport.msg), which say what
 they mean.
@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
-from bt_actions.story.why import causes
+from bt_actions.story.why import why_text
 from bt_actions.utilities.plain_text import clean
 
 SEPARATOR = " / "
 """Between the names of a path."""
 _MOST_TEXT = 4000
-"""Characters of a chain of failures."""
+"""Characters of an error_msg."""
 
 
 class Code(enum.IntEnum):
@@ -62,12 +62,19 @@ class RunOutcome:
     """The answer to a RunTree goal; see RunTree.action."""
 
     code: int
-    message: str = ""
+    why: str = ""
+    """Why it did not succeed; the first line has the root cause."""
     outputs: str = "{}"
     unaccounted: tuple[str, ...] = ()
     actions: tuple[ActionStory, ...] = ()
     at: float = 0.0
     """When the run ended, in seconds on the steady clock."""
+
+    @property
+    def message(self) -> str:
+        """Why it did not succeed, and what is left of it."""
+        left = [f"may still be running: {each}" for each in self.unaccounted]
+        return "\n".join([*filter(None, [self.why]), *left])[:_MOST_TEXT]
 
     @property
     def settled(self) -> bool:
@@ -93,36 +100,22 @@ def outcome_of(
 
     `outputs` is JSON; `unaccounted` has a line for each goal whose end is not known.
     """
-    code: int = Code.NONE
-    lines = []
+    left = tuple(unaccounted or ())
+    code: int
     if succeeded:
-        pass
+        code, why = Code.UNKNOWN if left else Code.NONE, ""
     elif error is not None:
-        code, lines = Code.EXCEPTION, [clean(str(error))]
+        code, why = Code.EXCEPTION, clean(str(error))
     elif ending is not None:
-        code, lines = ending.value[0], [ending.value[1]]
+        code, why = ending.value
     else:
-        code, lines = _failure(state)
-    left = list(unaccounted or ())
-    if left:
-        code = Code.UNKNOWN if succeeded else code
-        lines += [f"may still be running: {each}" for each in left]
-    return RunOutcome(
-        int(code),
-        "\n".join(lines)[:_MOST_TEXT],
-        outputs,
-        tuple(left),
-        tuple(state.actions),
-        state.latest,
-    )
+        code, why = _code_of(state), why_text(state) or "the tree failed"
+    return RunOutcome(int(code), why, outputs, left, tuple(state.actions), state.latest)
 
 
-def _failure(state: State) -> tuple[int, list[str]]:
-    """The first action that is to blame, and the chain, it first."""
-    chain = sorted(state.failures, key=lambda each: each.action is None)
-    code: int = Code.TREE_FAILED
-    for each in chain:
+def _code_of(state: State) -> int:
+    """The code of the first action that is to blame, if one is."""
+    for each in state.failures:
         if each.action is not None and each.action.outcome is not None:
-            code = Code.ACTION_FAILED + OUTCOMES[each.action.outcome]
-            break
-    return code, causes(state) or ["the tree failed"]
+            return Code.ACTION_FAILED + OUTCOMES[each.action.outcome]
+    return Code.TREE_FAILED

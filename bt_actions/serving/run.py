@@ -163,7 +163,7 @@ class Run:
             outputs=outputs,
             unaccounted=[f"{each.name} on {each.server}" for each in runner.unaccounted],
         )
-        runner.stream.add(RunEnded, outcome.code, "", outcome.message, outcome.unaccounted)
+        runner.stream.add(RunEnded, outcome.code, "", outcome.why, outcome.unaccounted)
         return outcome
 
     def _note(self, event: Event) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from py_trees.common import Status
+
 from bt_actions.document import Tree
 from bt_actions.events.snapshot import HIDDEN
 from bt_actions.serving.catalog import Entry
 from bt_actions.serving.outcome import Code, Ending, RunOutcome
 from bt_actions.serving.requests import Said
-from bt_actions.story.words import begins_text
+from bt_actions.story.words import begins_text, verdict
 from bt_actions.utilities.plain_text import clean
 
 SAME_NAME = "SAME_NAME"
@@ -24,15 +26,18 @@ def begins(file: str, tree: Tree, inputs: Mapping[str, object], goal_name: str) 
 
 
 def ends(outcome: RunOutcome, seconds: float | None) -> str:
-    """Say how a run has ended; `seconds` is None for one that never began."""
-    word = "FAILURE"
+    """Say how a run has ended; `seconds` is None for one that never began.
+
+    Which goals are not accounted for has been said of each.
+    """
+    status = Status.FAILURE
     if outcome.code in (Code.NONE, Code.UNKNOWN):
-        word = "SUCCESS"
+        status = Status.SUCCESS
     elif outcome.code in _STOPPED:
-        word = "STOPPED"
-    after = "" if seconds is None else f" after {seconds:.2f} s"
-    why = "; ".join(outcome.message.splitlines())
-    return f"ends: {word}{after}{f': {why}' if why else ''}"
+        status = Status.INVALID
+    left = "" if outcome.settled else ", and not all of its goals are accounted for"
+    why = f": {outcome.why}" if outcome.why else ""
+    return f"ends: {verdict(status, seconds)}{left}{why}"
 
 
 def warnings_of(entry: Entry) -> list[Said]:

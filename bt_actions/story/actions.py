@@ -39,6 +39,11 @@ class GoalStory:
         told = self.verdict.reason if self.verdict is not None else ""
         return told or self.latest.reason
 
+    @property
+    def in_doubt(self) -> bool:
+        """Whether it has not begun as far as its server knows, which may change."""
+        return self.latest.end is End.NEVER_STARTED and self.latest.state != DONE
+
     def observe(self, event: GoalChanged) -> None:
         """Take in what has become of it."""
         if event.state != self.latest.state:
@@ -121,9 +126,8 @@ class ActionStory:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether the latest goal has not begun as far as its server knows, which may change."""
-        latest = self.latest and self.latest.latest
-        return self.end is End.NEVER_STARTED and latest in self.open
+        """Whether that is so of the latest goal."""
+        return self.latest is not None and self.latest.in_doubt
 
     @property
     def waited_for(self) -> int:

@@ -135,6 +135,8 @@ class State:
         self.dealt_with_in_all = 0
         self._actions: dict[int, ActionStory] = {}
         self._warnings: dict[int, Warned] = {}
+        self._names: dict[int, str] = {}
+        """Of all nodes, also those that are in the tree no more."""
         self._called: dict[int, str] = {}
 
     # Taking in
@@ -197,6 +199,7 @@ class State:
     def _add(self, nodes: tuple[Node, ...]) -> None:
         for node in nodes:
             self.nodes[node.id] = NodeStory(node)
+            self._names[node.id] = node.name
             if node.parent in self.nodes:
                 self.nodes[node.parent].children.append(node.id)
         self._called.clear()
@@ -389,12 +392,7 @@ class State:
             paths = {key: self.path(key) for key, each in self.nodes.items() if each.is_leaf}
             names = told_apart(paths.values())
             self._called = {key: names[path] for key, path in paths.items()}
-        return self._called.get(node) or self._node(node).name
-
-    def _node(self, number: int) -> Node:
-        """Return a node, also an action that is in the tree no more."""
-        story = self.nodes.get(number)
-        return story.node if story is not None else self._actions[number].node
+        return self._called.get(node, self._names[node])
 
     @property
     def running(self) -> list[NodeStory]:

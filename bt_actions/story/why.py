@@ -13,7 +13,7 @@ from py_trees.common import Status
 
 from bt_actions.events.kinds import Node, RoundBegan
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.story.actions import ActionStory, GoalStory
+from bt_actions.story.actions import DONE, ActionStory, GoalStory
 from bt_actions.story.state import Failure, NodeStory, State
 from bt_actions.story.values import feedback_text, opened
 from bt_actions.story.waiting import due_of
@@ -28,6 +28,8 @@ ATTEMPTS = 3
 """Attempts of one failure that have a line of their own: the last ones."""
 BELOW = 5
 """Lines of a run below a RunTree leaf."""
+_BELOW = "has failed:"
+"""Ends the line before these."""
 _WAITS = {
     "QUEUED": "waits for its turn on",
     "WAITING_FOR_SERVER": "waits for the server",
@@ -35,6 +37,21 @@ _WAITS = {
     "EXECUTING": "waits for the result of",
     "CANCELING": "waits for the end at",
 }
+
+_USUAL_ENDS = {
+    Outcome.SUCCEEDED: End.SUCCEEDED,
+    Outcome.UNEXPECTED_RESULT: End.SUCCEEDED,
+    Outcome.ABORTED: End.ABORTED,
+    Outcome.CANCELED: End.CANCELED,
+    Outcome.CANCELED_BY_OTHER: End.CANCELED,
+    Outcome.REJECTED: End.NEVER_STARTED,
+    Outcome.SERVER_UNAVAILABLE: End.NEVER_STARTED,
+    Outcome.SERVER_AMBIGUOUS: End.NEVER_STARTED,
+    Outcome.SERVER_BUSY: End.NEVER_STARTED,
+    Outcome.INVALID_GOAL: End.NEVER_STARTED,
+    Outcome.SERVER_LOST: End.SERVER_GONE,
+}
+"""Ends that go without saying."""
 
 
 def why(state: State, now: float | None = None) -> list[str]:
@@ -65,17 +82,13 @@ def why(state: State, now: float | None = None) -> list[str]:
     return [fit(line) for line in lines + dealt]
 
 
-def causes(state: State) -> list[str]:
-    """Return why the run has failed, a line for each cause: for who gets one text of it all."""
-    lines = []
-    for failure in state.failures:
-        said = failure.message or "failed"
-        if failure.action is not None and failure.attempts:
-            last = failure.attempts[-1]
-            said = f"{last.outcome}: {last.reason or failure.message}"
-        place = f" ({failure.place})" if failure.place else ""
-        lines.append(f"{' / '.join(failure.path)}: {said}{place}")
-    return lines
+def why_text(state: State, now: float | None = None) -> str:
+    """Return the same as one text, for a reader who may show the first line alone.
+
+    That line has the cause as well as its place in the tree; of a RunTree leaf, the cause below.
+    """
+    text = "\n".join(why(state, now))
+    return text.replace(f"{_BELOW}\n    ", f"{_BELOW} ", 1).replace("\n  ", ": ", 1)
 
 
 # While it runs
@@ -123,7 +136,7 @@ def _told(failure: Failure, state: State) -> Iterator[str]:
         said = each.message
         if each.action is not None and each.attempts:
             said = attempt_text(each.action, each.attempts[-1])
-        yield clean(f"  it stopped {each.node.name}{f': {said}' if said else ''}")
+        yield clean(f"  it stopped {state.called(each.node.id)}{f': {said}' if said else ''}")
     failed = state.status is Status.FAILURE
     holders = state.above(failure.node.id) if failed else ()
     passed = ", ".join(f"{above.node.name} ({above.node.kind})" for above in holders)
@@ -138,7 +151,7 @@ def _attempts(failure: Failure) -> Iterator[str]:
         return
     below = opened(goals[-1].result).get("error_msg") if action.node.action == "RunTree" else ""
     if isinstance(below, str) and below:
-        yield clean(f"  {goals[-1].outcome}: the run at {action.server} has failed:")
+        yield clean(f"  {goals[-1].outcome}: the run at {action.server} {_BELOW}")
         yield from (f"    {clean(line)}" for line in below.splitlines()[:BELOW])
         return
     told: list[tuple[int, int, str]] = []
@@ -148,10 +161,9 @@ def _attempts(failure: Failure) -> Iterator[str]:
             told[-1] = (told[-1][0], number, text)
         else:
             told.append((number, number, text))
-    if len(told) > ATTEMPTS:
-        yield f"  {len(goals)} attempts, the last {ATTEMPTS}:"
+    of = f" of {len(goals)}" if len(told) > ATTEMPTS else ""
     for first, last, text in told[-ATTEMPTS:]:
-        which = f"attempt {first}: " if first == last else f"attempts {first} to {last}: "
+        which = f"attempt {first}{of}: " if first == last else f"attempts {first} to {last}{of}: "
         yield clean(f"  {which if len(goals) > 1 else ''}{text}")
 
 
@@ -164,9 +176,13 @@ def attempt_text(action: ActionStory, goal: GoalStory) -> str:
         )
         wanted = f"expected {fit(verdict.expect, 100)}"
         why_not = f"{seen}; {wanted}" if seen else wanted
-    else:  # of an end that is not known the run tells at its end
-        why_not = "" if goal.latest.end is End.UNKNOWN else goal.reason
-    told = f"{goal.outcome}: {why_not}" if why_not else f"{goal.outcome}"
+    else:  # of an end that nobody will tell any more the run tells at its end
+        is_left = goal.latest.state == DONE and goal.latest.end is End.UNKNOWN
+        why_not = "" if is_left else goal.reason
+    told = goal.latest.state  # of a run that was left
+    if goal.outcome is not None:
+        told = outcome_text(goal.outcome, goal.latest.end, goal.in_doubt)
+    told += f": {why_not}" if why_not else ""
     sent = shorten(opened(goal.goal), LONG) if goal.goal is not None else ""
     if sent and "goal {" not in told:
         told += f"; goal {sent}"
@@ -175,6 +191,15 @@ def attempt_text(action: ActionStory, goal: GoalStory) -> str:
     elif goal.feedback is not None and goal.outcome not in (Outcome.ABORTED, Outcome.SUCCEEDED):
         told += f"; last feedback {shorten(opened(goal.feedback.feedback), LONG)}"
     return told
+
+
+def outcome_text(outcome: Outcome, end: End | None, in_doubt: bool) -> str:
+    """Say what the outcome of a goal is, and how the goal ended where that does not follow."""
+    if in_doubt:
+        return f"{outcome}, not started as far as its server knows"
+    if end is None or end is _USUAL_ENDS.get(outcome):
+        return f"{outcome}"
+    return f"{outcome}, end not known" if end is End.UNKNOWN else f"{outcome}, ended {end}"
 
 
 def _dealt_with(state: State) -> Iterator[str]:

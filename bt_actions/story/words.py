@@ -16,25 +16,11 @@ from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import NodeStory, State
 from bt_actions.story.table import table
 from bt_actions.story.values import constants_of, feedback_text, named
-from bt_actions.story.why import why
+from bt_actions.story.why import outcome_text, why
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import MESSAGE, brief, fit, shorten
 from bt_actions.utilities.suggest import listing
 
-_USUAL_ENDS = {
-    Outcome.SUCCEEDED: End.SUCCEEDED,
-    Outcome.UNEXPECTED_RESULT: End.SUCCEEDED,
-    Outcome.ABORTED: End.ABORTED,
-    Outcome.CANCELED: End.CANCELED,
-    Outcome.CANCELED_BY_OTHER: End.CANCELED,
-    Outcome.REJECTED: End.NEVER_STARTED,
-    Outcome.SERVER_UNAVAILABLE: End.NEVER_STARTED,
-    Outcome.SERVER_AMBIGUOUS: End.NEVER_STARTED,
-    Outcome.SERVER_BUSY: End.NEVER_STARTED,
-    Outcome.INVALID_GOAL: End.NEVER_STARTED,
-    Outcome.SERVER_LOST: End.SERVER_GONE,
-}
-"""Ends that go without saying."""
 _NOTHING = RunEnded(Moment(0, 0.0, 0.0, 0.0), 0)
 MOST = 3
 """Of many actions that are waited for, or many items of a list, how many are shown."""
@@ -48,6 +34,12 @@ def begins_text(file: str, inputs: Mapping[str, object]) -> str:
     return clean(f"begins{f' ({file})' if file else ''}{' with ' if words else ''}{words}")
 
 
+def verdict(status: Status, seconds: float | None) -> str:
+    """Say how a run has ended, and after how long; `seconds` is None for one that never began."""
+    word = "STOPPED" if status is Status.INVALID else status.value
+    return word if seconds is None else f"{word} after {seconds:.2f} s"
+
+
 def last_words(state: State, width: int = MESSAGE) -> list[str]:
     """Return the table, the verdict, how long it took, and last what went wrong."""
     ended = state.ended or _NOTHING
@@ -55,10 +47,10 @@ def last_words(state: State, width: int = MESSAGE) -> list[str]:
     outputs = [clean(f"{name}: {brief(value)}") for name, value in state.outputs.items()]
     lines += ["", *outputs] if outputs else []
     lines += ["", ended.world] if ended.world else []
-    word = state.status.value if state.status is not Status.INVALID else "STOPPED"
     cause = f", {ended.cause}" if ended.cause else ""
-    cause += ", but not as it should be" if ended.complaint and word == "SUCCESS" else ""
-    lines += ["", f"{word} after {state.elapsed:.2f} s{cause}"]
+    if ended.complaint and state.status is Status.SUCCESS:
+        cause += ", but not as it should be"
+    lines += ["", f"{verdict(state.status, state.elapsed)}{cause}"]
     wrong = troubles(state)
     return [*lines, *(["", *wrong] if wrong else [])]
 
@@ -109,16 +101,11 @@ def goal_text(action: ActionStory) -> str:
             "CANCELING": "canceling on",
         }
         return f"{words.get(action.state, action.state.lower())} {action.server}{attempt}"
-    text = f"{action.outcome}{attempt}"
+    text = outcome_text(action.outcome, action.end, action.in_doubt)
     if action.end is End.UNKNOWN:  # why, is told of the goal
-        return f"{text}, end not known{' yet' if action.live else ''}"
-    if action.in_doubt:
-        text += ", not started as far as its server knows"
-    elif action.end is not None and action.end is not _USUAL_ENDS.get(action.outcome):
-        text += f", ended {action.end}"
-    return text + (
-        f": {action.reason}" if action.reason and action.outcome is not Outcome.SUCCEEDED else ""
-    )
+        return f"{text}{' yet' if action.live else ''}{attempt}"
+    said = action.reason if action.outcome is not Outcome.SUCCEEDED else ""
+    return f"{text}{attempt}{said and f': {said}'}"
 
 
 def stopping_text(state: State) -> str:

@@ -14,7 +14,7 @@ from py_trees.trees import BehaviourTree
 from bt_actions.events import AttemptEnded
 from bt_actions.running.loop import TickLoop
 from bt_actions.story.state import State
-from bt_actions.story.why import causes
+from bt_actions.story.why import why_text
 from bt_actions.testing.backend import VirtualBackend
 from bt_actions.testing.network import VirtualNetwork
 from bt_actions.utilities.shorten import fit
@@ -68,8 +68,8 @@ class VirtualRunner:
         self._loop.observe(self._note)
 
     def __repr__(self) -> str:
-        """Tell why the run failed, too: pytest prints it where an assertion fails."""
-        why = fit("; ".join(causes(self.state)), 150)
+        """Tell why the run failed, or waits: pytest prints it where an assertion fails."""
+        why = fit(why_text(self.state, self.now).partition("\n")[0], 150)
         return f"<VirtualRunner of {self.tree.root.name!r} at {self.now:g} s{why and f': {why}'}>"
 
     @property

@@ -47,8 +47,8 @@ def test_a_run_that_is_not_settled_has_not_succeeded_whatever_its_status() -> No
     assert leaf._read_result(result) == "the run left goals whose end is not known: Go: left"
 
 
-def test_the_reason_of_a_failure_is_that_of_the_run_below() -> None:
+def test_the_reason_of_a_failure_is_the_root_cause_of_the_run_below() -> None:
     leaf = RunTree("Move", "move")
-    result = SimpleNamespace(error_msg="Move / Go: ABORTED\nMove: failed")
-    assert leaf.explain(Outcome.ABORTED, result) == "Move / Go: ABORTED; Move: failed"
+    result = SimpleNamespace(error_msg="Move / Go: ABORTED\n  move.yaml:8:7")
+    assert leaf.explain(Outcome.ABORTED, result) == "Move / Go: ABORTED"
     assert "~/rejections" in leaf.explain(Outcome.REJECTED, None)

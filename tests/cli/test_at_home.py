@@ -124,7 +124,8 @@ def test_a_failure_is_told_on_rosout_with_its_reason_and_is_printed_once(
     assert begins == (20, f"one_move begins ({path})")
     assert reason[0] == 40
     assert reason[1].startswith("one_move: ")
-    assert str(path) in reason[1]
+    assert "ABORTED: aborted by" in reason[1].splitlines()[0], "for who shows one line"
+    assert f"\n    {path}:" in reason[1]
     assert ends[0] == 40
     assert ends[1].startswith("one_move ends: FAILURE after ")
     assert not any("begins" in line or "ends:" in line for line in [*run.lines, *run.errors])

@@ -111,7 +111,8 @@ def test_who_waits_after_the_end_of_the_tree_is_told_for_which_goals(
 ) -> None:
     run = Run(FakeRunner(waits=True))
     late = story.goal(leaf, "CANCELING", outcome=Outcome.ACCEPT_TIMEOUT, end=End.NEVER_STARTED)
-    run.runner.before = [story.began, late, story.node(leaf, Status.FAILURE)]
+    verdict = story.verdict(leaf, Outcome.ACCEPT_TIMEOUT)
+    run.runner.before = [story.began, late, verdict, story.node(leaf, Status.FAILURE)]
     unknown = story.goal(leaf, "CANCELING", outcome=Outcome.ACCEPT_TIMEOUT, end=End.UNKNOWN)
     run.runner.after = [unknown, story.finish(Status.FAILURE)]
     said = "waiting to know the end of 1 goal: Move on move_robot; Ctrl-C twice leaves"

@@ -1,4 +1,4 @@
-"""The numbers of a run's outcome are those of the interfaces."""
+"""A run's outcome: its numbers are those of the interfaces, its text is the story of the run."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ import pytest
 from bt_actions_interfaces.action import RunTree
 from bt_actions_interfaces.msg import ActionReport, TreeInfo
 
+from bt_actions import load_tree
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.serving.catalog import State
-from bt_actions.serving.outcome import ENDS, OUTCOMES, Code
+from bt_actions.serving.diagnostics import Standing, judge
+from bt_actions.serving.outcome import ENDS, OUTCOMES, Code, outcome_of
+from bt_actions.story.why import why
+from bt_actions.testing import Simulation, VirtualNetwork, VirtualRunner
 
 
 @pytest.mark.parametrize("outcome", Outcome)
@@ -29,3 +33,19 @@ def test_each_error_code_has_its_number(code: Code) -> None:
 @pytest.mark.parametrize("state", State)
 def test_each_state_of_a_tree_has_its_number(state: State) -> None:
     assert state.value == getattr(TreeInfo, state.name)
+
+
+def test_a_failure_is_told_as_in_a_terminal_and_its_first_line_is_enough() -> None:
+    network = VirtualNetwork()
+    Simulation(network, faults=["move_robot:12:abort"])
+    runner = VirtualRunner(load_tree("examples/night/night.yaml"), network)
+    runner.run()
+    outcome = outcome_of(runner.state, succeeded=False, unaccounted=["Home on /move_robot"])
+    cause, *rest, left = outcome.message.splitlines()
+    path, reason, *more = why(runner.state)
+    assert cause == f"{path}: {reason.strip()}"
+    assert rest == more
+    assert "failed before, and dealt with:" in rest
+    assert left == "may still be running: Home on /move_robot"
+    settled = outcome_of(runner.state, succeeded=False)
+    assert judge(Standing("night", last=settled), "")[1] == f"the last run failed: {cause}"

@@ -11,7 +11,7 @@ from robot_control_interfaces.action import MoveRobot as Move
 from bt_actions import MoveRobot, Timeouts, load_tree
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.state import State
-from bt_actions.story.why import why
+from bt_actions.story.why import why, why_text
 from bt_actions.testing import Script, ScriptedServer, Simulation, VirtualNetwork, VirtualRunner
 from tests.support.told_trees import FakeAction, FakeNode, Story
 from tests.support.trees import together
@@ -113,3 +113,83 @@ def test_while_it_runs_each_leaf_says_what_it_waits_for_and_until_when() -> None
         f"left waits for the result of /left for 1.9 s; timeout.result at 8 s; {feedback}",
         "right waits for the server /right for 1.9 s; timeout.server at 5 s",
     ]
+
+
+def test_a_run_below_is_told_by_the_story_that_its_server_gives(
+    leaf: FakeNode, story: Story
+) -> None:
+    grasp = FakeAction("Grasp", place="trees/x.yaml:20:9")
+    failing = FakeNode("Deliver", [leaf, grasp], "fallback")
+    below = Story(failing)
+    run = FakeAction("Run it", "/r1/run_tree", "fleet.yaml:4:7")
+    run.action = "RunTree"
+    above = Story(FakeNode("Fleet", [run]))
+    state = below.told(
+        *below.fail(leaf, "a fault"),
+        *below.fail(grasp, "another"),
+        below.node(failing, Status.FAILURE),
+        below.finish(Status.FAILURE),
+    )
+    aborted = {"outcome": Outcome.ABORTED, "end": End.ABORTED}
+    said = why_text(state)
+    outer = above.told(
+        above.goal(run, "EXECUTING"),
+        above.goal(run, "DONE", **aborted, result={"error_msg": said}),
+        above.node(run, Status.FAILURE),
+        above.node(above.root, Status.FAILURE),
+        above.finish(Status.FAILURE),
+    )
+    first, *more = said.splitlines()
+    assert why(outer)[1:] == [
+        "  ABORTED: the run at /r1/run_tree has failed:",
+        *(f"    {line}" for line in (first, *more)),
+        "  fleet.yaml:4:7; passed on by Fleet (sequence)",
+    ]
+    cause = why_text(outer).splitlines()[0]
+    assert cause.endswith(f"  Fleet / Run it: ABORTED: the run at /r1/run_tree has failed: {first}")
+    assert first.endswith("  Deliver / Move: ABORTED: a fault")
+
+
+def test_of_more_attempts_than_are_told_each_says_how_many_there_were(
+    leaf: FakeNode, story: Story
+) -> None:
+    events = [story.goal(leaf, "EXECUTING")]
+    for number in range(1, 6):
+        done = {"outcome": Outcome.ABORTED, "end": End.ABORTED, "reason": f"fault {number}"}
+        events.append(story.goal(leaf, "DONE", attempt=number, **done))
+    events += [story.node(leaf, Status.FAILURE), story.node(story.root, Status.FAILURE)]
+    state = story.told(*events, story.finish(Status.FAILURE))
+    assert lines(state)[1:4] == [
+        f"  attempt {number} of 5: ABORTED: fault {number}" for number in (3, 4, 5)
+    ]
+
+
+def test_a_failure_of_a_node_that_was_taken_out_since_is_told_by_its_name() -> None:
+    check, other = FakeNode("Check", kind="check"), FakeNode("Other", kind="check")
+    hold, last = FakeNode("Hold", [check, other], "fallback"), FakeNode("Last", kind="check")
+    story = Story(FakeNode("Deliver", [hold, last]))
+    state = story.told(
+        story.node(check, Status.FAILURE, "no"),
+        story.node(other, Status.SUCCESS),
+        story.node(hold, Status.SUCCESS),
+        story.remove(check),
+        story.node(last, Status.FAILURE),
+        story.node(story.root, Status.FAILURE),
+        story.finish(Status.FAILURE),
+    )
+    assert lines(state)[-1].endswith("  Check, failed: no; Hold (fallback) went on")
+
+
+def test_of_two_leaves_of_one_name_that_were_stopped_the_path_tells_which() -> None:
+    leaves = [FakeNode("Wait", kind="wait") for _ in "ab"]
+    sides = [FakeNode(name, [leaf]) for name, leaf in zip(("Left", "Right"), leaves, strict=True)]
+    root = FakeNode("In time", [FakeNode("Both", sides, "parallel")], "timeout")
+    story = Story(root)
+    state = story.told(
+        *(story.node(each, Status.RUNNING) for each in (*leaves, *sides, root)),
+        *(story.node(each, Status.INVALID) for each in leaves),
+        story.node(root, Status.FAILURE, "its time is over", by_itself=True),
+        story.finish(Status.FAILURE),
+    )
+    stopped = [line for line in lines(state) if "it stopped" in line]
+    assert sorted(stopped) == ["  it stopped Left / Wait", "  it stopped Right / Wait"]

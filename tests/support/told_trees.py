@@ -16,6 +16,7 @@ from bt_actions.events import (
     Node,
     NodeChanged,
     NodesAdded,
+    NodesRemoved,
     RoundBegan,
     RunBegan,
     TreeFinished,
@@ -96,6 +97,10 @@ class Story:
         """A node that is inserted while the tree runs."""
         node.parent = parent
         return NodesAdded(self._next(), (self._node(node),))
+
+    def remove(self, node: FakeNode) -> NodesRemoved:
+        """A leaf that is taken out while the tree runs."""
+        return NodesRemoved(self._next(), (node.id,))
 
     def node(
         self,
