@@ -37,7 +37,8 @@ class Rosout:
             self._publish(Log(stamp=stamp, level=LEVELS[level], name=name, msg=clean_lines(text)))
 
     def tell(self, level: Level, text: str) -> None:
-        """Say it, and write it to the log with the node's full name."""
+        """Say it, and write each line of it to the log with the node's full name."""
         put = {"info": log.info, "warn": log.warning, "error": log.error}[level]
-        put(f"{self._name}: {text}")
+        for line in text.splitlines():
+            put(f"{self._name}: {line}")
         self.say(level, text)

@@ -347,6 +347,8 @@ class TreeServer:
         """Have the goal of a run that is over answered, and the next run begin."""
         seconds = None if goal.begun_at is None else time.monotonic() - goal.begun_at
         self._tell_of(goal, ends(outcome, seconds), "info" if outcome.as_wanted else "error")
+        for each in outcome.unaccounted:  # the log has it from whoever gave it up
+            self._rosout.say("error", f"{goal.label} may still be running: {each}")
         self._last[goal.tree] = outcome
         if outcome.settled:
             self._underway.ends(goal.id)

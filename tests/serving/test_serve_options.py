@@ -158,4 +158,4 @@ def test_a_second_ctrl_c_waits_for_no_goal_and_names_what_may_still_run(
         meanwhile=lambda: time.monotonic() > began + SAME_WISH and server.send(signal.SIGINT),
     )
     assert server.wait() == 3
-    assert any(f"may still be running: Go on {name}" in line for line in server.errors)
+    assert sum(f"not accounted for: Go on {name}" in line for line in server.errors) == 1, server

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -150,6 +151,9 @@ def test_a_goal_below_that_cannot_be_accounted_for_makes_the_answer_unsettled(
     assert result.actions[0].end == ActionReport.END_UNKNOWN
     server.send(signal.SIGINT)
     assert server.wait() == 3
+    (told,) = [line for line in server.errors if f"Go on {name}" in line]
+    assert "not accounted for: Go on" in told
+    assert server.errors[-1].endswith("1 goal is not accounted for; the log names each"), server
 
 
 def test_a_failure_names_the_action_to_blame_with_its_place(
@@ -160,8 +164,9 @@ def test_a_failure_names_the_action_to_blame_with_its_place(
     status, result = client.result(client.send("move", "{distance: 0.2}"))
     assert status == GoalStatus.STATUS_ABORTED
     assert result.error_code == R.ACTION_FAILED + ActionReport.ABORTED
-    assert result.error_msg.startswith("Move / Go: ABORTED")
-    assert f"({folder / 'move.yaml'}:8:7)" in result.error_msg
+    cause, place = result.error_msg.splitlines()
+    assert re.match(r"\d\d:\d\d:\d\d  Move / Go: ABORTED: .*; goal {distance: 0.2}", cause)
+    assert place.startswith(f"  {folder / 'move.yaml'}:8:7; passed on by Move (")
     assert result.settled
 
 

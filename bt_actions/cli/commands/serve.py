@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.arguments.options import MOST, add_option, count
@@ -104,19 +104,17 @@ def run(args: argparse.Namespace) -> int:
 def _close(server: TreeServer, signals: Signals) -> None:
     """Close the server; one more signal ends the wait, and a run that does not end then is left."""
     signals.during(server.close, lambda _: server.abandon())
+    for each in server.stuck:
+        note(f"bt-actions serve: may still be running: {each}")
     if server.stuck:
-        _tell((*server.unaccounted, *server.stuck))
-        leave(Exit.UNKNOWN)
+        leave(_conclude(server, Exit.UNKNOWN))
 
 
 def _conclude(server: TreeServer, code: Exit) -> Exit:
-    _tell(server.unaccounted)
-    return Exit.UNKNOWN if server.unaccounted else code
-
-
-def _tell(unaccounted: Iterable[str]) -> None:
-    for each in unaccounted:
-        note(f"bt-actions serve: may still be running: {each}")
+    if left := len(server.unaccounted):
+        goals = "1 goal is" if left == 1 else f"{left} goals are"
+        note(f"bt-actions serve: {goals} not accounted for; the log names each")
+    return Exit.UNKNOWN if left else code
 
 
 def _clean_up() -> Exit:
