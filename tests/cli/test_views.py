@@ -14,7 +14,9 @@ import pyte
 import pytest
 from py_trees.common import Status
 from rich.console import Console
+from robot_control_interfaces.action import MoveRobot as Move
 
+from bt_actions import MoveRobot, Retry
 from bt_actions.cli.driving.feed import Feed
 from bt_actions.cli.views.choosing import choose
 from bt_actions.cli.views.json_lines import JsonView
@@ -27,8 +29,9 @@ from bt_actions.events.snapshot import snapshot
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.state import State
 from bt_actions.story.words import last_words
-from bt_actions.testing import VirtualRunner
+from bt_actions.testing import ScriptedServer, VirtualNetwork, VirtualRunner
 from tests.support.told_trees import FakeAction, FakeNode, Story
+from tests.support.trees import together
 
 
 @pytest.fixture
@@ -83,7 +86,7 @@ class Lines:
         return [line[12:] for line in self.out.getvalue().splitlines()]
 
 
-def test_a_line_for_each_change_of_a_node_one_for_a_goal_under_way_and_one_for_its_end(
+def test_a_line_for_each_change_of_a_node_one_for_a_goal_under_way_and_one_for_its_failure(
     root: FakeNode, leaves: list[FakeNode], story: Story
 ) -> None:
     lines = Lines(story.began, story.node(root, Status.RUNNING), *story.succeed(leaves[0]))
@@ -91,13 +94,65 @@ def test_a_line_for_each_change_of_a_node_one_for_a_goal_under_way_and_one_for_i
     for state in ("QUEUED", "WAITING_FOR_SERVER", "SENDING", "EXECUTING", "EXECUTING"):
         lines.feed(story.goal(leaves[1], state))
     aborted = {"outcome": Outcome.ABORTED, "end": End.ABORTED, "reason": "a fault"}
-    lines.feed(story.goal(leaves[1], "DONE", **aborted))
+    lines.feed(
+        story.goal(leaves[1], "DONE", **aborted),
+        story.verdict(leaves[1], Outcome.ABORTED, "a fault; its result is: {}"),
+        story.node(leaves[1], Status.FAILURE, "ABORTED: a fault; its result is: {}"),
+    )
     assert lines.out.getvalue().splitlines() == [
         "    0.50 s  RUNNING  Deliver",
         "    2.00 s  goal     Deliver / Work / Step 0: executing on move_robot",
         "    3.00 s  SUCCESS  Deliver / Work / Step 0",
         "    5.50 s  goal     Deliver / Work / Step 1: executing on move_robot",
-        "    6.50 s  goal     Deliver / Work / Step 1: ABORTED: a fault",
+        "    7.00 s  goal     Deliver / Work / Step 1: ABORTED: a fault; its result is: {}",
+        "    7.50 s  FAILURE  Deliver / Work / Step 1: ABORTED",
+    ]
+
+
+def test_each_attempt_that_fails_says_once_what_came_when_it_came() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, Move, "move_robot")
+    given = {"expect": "result.final_pose > 9.0", "retry": Retry(2, backoff=0.5)}
+    runner = VirtualRunner(together(MoveRobot("Move", 1.0, **given)), network)
+    assert runner.run() is Status.FAILURE
+    told = "goal     together / Move: "
+    first, verdict, second, last, *more = [
+        line for line in Lines(*runner.events).said if "Move: " in line
+    ]
+    unmet = "UNEXPECTED_RESULT: result.final_pose is 0.0; expected result.final_pose > 9.0"
+    assert first == f"{told}executing on /move_robot"
+    assert verdict.startswith(f"{told}attempt 1 of 2: {unmet}; goal {{distance: 1.0}}; result {{")
+    assert re.search(r"; again in 0.\d s$", verdict)
+    assert second == f"{told}executing on /move_robot (attempt 2)"
+    assert last.startswith(f"{told}attempt 2 of 2: {unmet}; goal {{distance: 1.0}}; result {{")
+    assert more == ["FAILURE  together / Move: UNEXPECTED_RESULT (attempt 2 of 2)"]
+
+
+def test_a_goal_whose_end_comes_after_its_outcome_has_a_line_at_its_end(
+    leaves: list[FakeNode], story: Story
+) -> None:
+    story.step = LASTING / 10
+    late = {"outcome": Outcome.RESULT_TIMEOUT, "reason": "not finished within 5 s"}
+    lines = Lines(
+        story.began,
+        story.node(leaves[0], Status.RUNNING),
+        story.goal(leaves[0], "CANCELING", end=End.UNKNOWN, **late),
+        story.verdict(leaves[0], Outcome.RESULT_TIMEOUT, "not finished within 5 s"),
+        story.goal(leaves[0], "DONE", end=End.CANCELED, **late),
+    )
+    told = "goal     Deliver / Work / Step 0: "
+    reason = "RESULT_TIMEOUT, end not known: not finished within 5 s"
+    assert lines.said == [f"{told}{reason}", f"{told}ended CANCELED"]
+
+
+def test_a_node_that_takes_over_the_words_of_its_child_does_not_say_them_again(
+    leaves: list[FakeNode], story: Story
+) -> None:
+    recover = story.root.children[1]
+    failures = [story.node(each, Status.FAILURE, "no way") for each in (recover, story.root)]
+    assert Lines(story.began, *failures).said == [
+        "FAILURE  Deliver / Recover: no way",
+        "FAILURE  Deliver",
     ]
 
 

@@ -9,6 +9,7 @@ from py_trees.common import Status
 from bt_actions.cli.views.choosing import below
 from bt_actions.cli.views.view import View
 from bt_actions.events import (
+    AttemptEnded,
     Event,
     GoalChanged,
     NodeChanged,
@@ -18,8 +19,9 @@ from bt_actions.events import (
     TreeFinished,
 )
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.story.actions import DONE
-from bt_actions.story.state import OVER, State
+from bt_actions.story.actions import DONE, ActionStory
+from bt_actions.story.state import OVER, NodeStory, State
+from bt_actions.story.why import attempt_text
 from bt_actions.story.words import goal_text, last_words, stopping_text, troubles
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import fit
@@ -29,11 +31,11 @@ LASTING = 1.0
 
 
 class LineView(View):
-    """One line a change of a node, one for a goal that is under way and one for how it ended.
+    """One line a change of a node, one for a goal under way, and one for an attempt that failed.
 
     The lines of a goal come after the news of the tick in which it was sent. A goal that waits, is
-    sent or is canceled gets a line when that lasts. What is told of a node is told again in each
-    round of a loop.
+    sent or is canceled gets a line when that lasts; one whose end comes after its outcome, at its
+    end. What is told of a node is told again in each round of a loop.
     """
 
     def __init__(self, state: State, out: TextIO, *, verbose: bool = False) -> None:
@@ -58,6 +60,8 @@ class LineView(View):
                 self._node(event)
             case GoalChanged():
                 self._goal(event)
+            case AttemptEnded():
+                self._attempt(event)
             case RoundBegan():
                 for node in below(self._state, event.node):
                     self._nodes.pop(node, None)
@@ -85,26 +89,52 @@ class LineView(View):
                 self._nodes.pop(event.node, None)
             return
         self._nodes[event.node] = event.status
-        said = "" if event.message in ("", Outcome.SUCCEEDED) else f": {event.message}"
+        said = self._news(story)
         path = " / ".join(self._state.path(event.node))
-        self._line(event.at.steady, event.status.value, f"{path}{said}")
+        self._line(event.at.steady, event.status.value, f"{path}{said and f': {said}'}")
+
+    def _news(self, story: NodeStory) -> str:
+        """Return what a node says that no line has said, of its attempt or of a child."""
+        said = story.message
+        if said == Outcome.SUCCEEDED or said in [
+            self._state.nodes[each].message for each in story.children
+        ]:
+            return ""
+        if story.status is Status.FAILURE and self._state.acts(story.node.id):
+            return said.removesuffix(f": {self._state.action(story.node.id).reason}")
+        return said
 
     def _goal(self, event: GoalChanged) -> None:
         key, action = event.node, self._state.action(event.node)
-        change = (action.attempts, event.state, event.outcome, event.end)
+        change = (event.goal_id, event.state, event.outcome, event.end)
         self._passing.pop(key, None)
         if event.outcome is Outcome.SUCCEEDED or self._goals.get(key) == change:
             return  # a success is told by the leaf's
         self._goals[key] = change
-        text, now = goal_text(action), event.at.steady
-        if not self._verbose and not _is_told(event):
-            self._passing[key] = (now, text)
-        elif self._is_ahead(event):
-            self._held.setdefault(key, []).append((now, text))
+        is_over = event.outcome is not None
+        if is_over and (event.state == DONE or event.end is not End.UNKNOWN):
+            if action.goals[event.goal_id].verdict is not None:  # else that is to come
+                end = "end not known" if event.end is End.UNKNOWN else f"ended {event.end}"
+                self._tell(event, f"{_which(action, event)}{end}")
+        elif not is_over and (self._verbose or event.state == "EXECUTING"):
+            self._tell(event, goal_text(action))
         else:
-            self._goal_line(now, key, text)
+            self._passing[key] = (event.at.steady, goal_text(action))
 
-    def _is_ahead(self, event: GoalChanged) -> bool:
+    def _attempt(self, event: AttemptEnded) -> None:
+        action = self._state.action(event.node)
+        if event.outcome is not Outcome.SUCCEEDED:
+            text = attempt_text(action, action.goals[event.goal_id])
+            again = f"; again in {event.again_in:.1f} s" if event.again_in else ""
+            self._tell(event, f"{_which(action, event)}{text}{again}")
+
+    def _tell(self, event: GoalChanged | AttemptEnded, text: str) -> None:
+        if self._is_ahead(event):
+            self._held.setdefault(event.node, []).append((event.at.steady, text))
+        else:
+            self._goal_line(event.at.steady, event.node, text)
+
+    def _is_ahead(self, event: GoalChanged | AttemptEnded) -> bool:
         """Whether the leaf has still to tell of the visit in which the goal was begun."""
         story, latest = self._state.nodes[event.node], self._state.action(event.node).latest
         begun = latest is not None and latest.began.number > story.number
@@ -135,11 +165,8 @@ class LineView(View):
         self._out.flush()
 
 
-def _is_told(event: GoalChanged) -> bool:
-    """Whether a goal's state is worth a line however short it lasts."""
-    if event.outcome is None:
-        return event.state == "EXECUTING"
-    return event.state == DONE or event.end is not End.UNKNOWN
+def _which(action: ActionStory, event: GoalChanged | AttemptEnded) -> str:
+    return f"attempt {event.attempt} of {action.of}: " if action.of > 1 else ""
 
 
 class QuietView(View):
