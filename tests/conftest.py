@@ -104,12 +104,15 @@ def _all_records(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def _records(_all_records: Path) -> Iterator[None]:
-    """What a test's programs send and nobody answers is no other test's (recovery/ledger.py).
+    """What a test's programs send and nobody answers is no other test's (recovery/ledger.py), nor
+    are the runs that they record.
 
     With a patch of its own: the test's has to be undone before what other fixtures have patched.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("BT_ACTIONS_LEDGER", str(_all_records / str(next(_directories))))
+        place = _all_records / str(next(_directories))
+        patch.setenv("BT_ACTIONS_LEDGER", str(place))
+        patch.setenv("XDG_STATE_HOME", str(place.with_suffix(".state")))
         yield
 
 

@@ -19,7 +19,7 @@ ROOT = Path(bt_actions.__file__).parent
 ROOMS = [
     {"cli"},
     {"serving", "testing"},
-    {"render", "running", "simulation"},
+    {"recording", "render", "running", "simulation"},
     {"document"},
     {"behaviours"},
     {"wiring"},

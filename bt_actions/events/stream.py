@@ -78,7 +78,8 @@ class Stream:
     """Takes events from any thread."""
 
     def __init__(self, clock: Clock) -> None:
-        self._clock = clock
+        self.clock = clock
+        """The steady, the wall and the ROS clock, in seconds."""
         self._lock = threading.Lock()
         self._readers: tuple[Reader, ...] = ()
         self._number = 0
@@ -114,7 +115,7 @@ class Stream:
         if not self._readers:
             return
         with self._lock:
-            now = self._clock()
+            now = self.clock()
             for jump in self._jumps(now):
                 self._give(ClockJumped(self._moment(now), *jump))
             self._give(kind(self._moment(now), *args, **fields))

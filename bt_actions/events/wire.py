@@ -52,7 +52,7 @@ def from_line(line: str | bytes) -> Event:
 
 def to_plain(event: Event) -> dict[str, Any]:
     """Return an event as data that JSON can say; `kind` is its name."""
-    fields = {each.name: _packed(getattr(event, each.name)) for each in dataclasses.fields(event)}
+    fields = {each.name: packed(getattr(event, each.name)) for each in dataclasses.fields(event)}
     return {"kind": type(event).__name__, **fields}
 
 
@@ -74,7 +74,8 @@ def from_plain(data: object) -> Event:
         raise WireError(f"no event: {type(error).__name__} {error}") from error
 
 
-def _packed(value: Any) -> Any:
+def packed(value: Any) -> Any:
+    """Return what an event holds as data that JSON can say."""
     if isinstance(value, enum.Enum):
         return value.value
     if value is None or isinstance(value, str | bool):
@@ -86,14 +87,14 @@ def _packed(value: Any) -> Any:
     if isinstance(value, bytes):
         return {"$bytes": base64.b64encode(value).decode()}
     if isinstance(value, Cut):
-        return {"$cut": [_packed(value.head), value.more]}
+        return {"$cut": [packed(value.head), value.more]}
     if dataclasses.is_dataclass(value):
-        return {each.name: _packed(getattr(value, each.name)) for each in dataclasses.fields(value)}
+        return {each.name: packed(getattr(value, each.name)) for each in dataclasses.fields(value)}
     if isinstance(value, tuple):
-        return [_packed(item) for item in value]
+        return [packed(item) for item in value]
     if any(name.startswith("$") for name in value):
-        return {"$map": [[name, _packed(item)] for name, item in value.items()]}
-    return {name: _packed(item) for name, item in value.items()}
+        return {"$map": [[name, packed(item)] for name, item in value.items()]}
+    return {name: packed(item) for name, item in value.items()}
 
 
 def _value(data: Any) -> Any:
@@ -124,24 +125,25 @@ Reader = Callable[[Any], Any]
 @lru_cache(maxsize=64)
 def _readers(kind: Any) -> dict[str, Reader]:
     """How each field of a kind is read."""
-    return {name: _reader(hint) for name, hint in typing.get_type_hints(kind).items()}
+    return {name: reader_of(hint) for name, hint in typing.get_type_hints(kind).items()}
 
 
-def _reader(hint: Any) -> Reader:
+def reader_of(hint: Any) -> Reader:
+    """Return what reads such data back as a value of this type."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if origin in (typing.Union, types.UnionType) and type(None) in inner and len(inner) == 2:
-        read = _reader(next(each for each in inner if each is not type(None)))
+        read = reader_of(next(each for each in inner if each is not type(None)))
         return lambda data: None if data is None else read(data)
     if isinstance(hint, type) and issubclass(hint, enum.Enum):
         return hint
     if isinstance(hint, type) and issubclass(hint, tuple) and hasattr(hint, "_fields"):
-        readers = [_reader(each) for each in typing.get_type_hints(hint).values()]
+        readers = [reader_of(each) for each in typing.get_type_hints(hint).values()]
         return lambda data: hint(*(read(each) for read, each in zip(readers, data, strict=True)))
     if isinstance(hint, type) and dataclasses.is_dataclass(hint):
         fields = _readers(hint)
         return lambda data: hint(**{name: fields[name](each) for name, each in data.items()})
     if origin is tuple and len(inner) == 2 and inner[1] is Ellipsis:
-        read = _reader(inner[0])
+        read = reader_of(inner[0])
         return lambda data: tuple(read(each) for each in data)
     if origin is Mapping:
         return lambda data: _mapping(data, inner[1])

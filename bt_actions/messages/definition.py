@@ -51,3 +51,23 @@ def _text(name: str) -> str:
             if path.is_file():
                 return path.read_text(encoding="utf-8", errors="replace")
     raise UnknownInterface(f"{name} is installed without its file {file}.{kind}")
+
+
+def ros2msg(name: str) -> str:
+    """Return a message's text, and below lines of ``=`` those of the messages in it.
+
+    This is the form in which MCAP has schemas of ROS 2. Raises UnknownInterface.
+    """
+    texts, waiting = dict[str, str](), [name]
+    while waiting:
+        if (each := waiting.pop()) in texts:
+            continue
+        texts[each] = f"{_text(each).rstrip()}\n"
+        for line in texts[each].splitlines():
+            if field := _FIELD.match(line):
+                owner, _, message = field[1].rpartition("/")
+                waiting.append(f"{owner or each.partition('/')[0]}/msg/{message}")
+    first = texts.pop(name)
+    return first + "".join(
+        f"{'=' * 80}\nMSG: {each.replace('/msg/', '/')}\n{text}" for each, text in texts.items()
+    )

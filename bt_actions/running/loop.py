@@ -105,6 +105,8 @@ class TickLoop:
         self._timeout: float | None = None
         self._deadline = math.inf
         self._now = 0.0
+        self.ticks_since: float | None = None
+        """When the present tick began, on the steady clock; None between two ticks."""
         self._burst = 0
         self._status = Status.INVALID
         self._error: BaseException | None = None
@@ -244,11 +246,13 @@ class TickLoop:
 
     def _tick(self) -> bool:
         """Tick once, and tell whether that changed a status."""
+        self.ticks_since = self._now
         try:
             self._guarded(lambda: tick_once(self.tree, self._visitor))
         except _Abandoned:
             pass
         finally:
+            self.ticks_since = None
             changed = self._visitor.finish()
             self._tell_observers()
         return bool(changed)

@@ -139,6 +139,10 @@ class TreeRunner:
         """The events of all runs, for readers on threads of their own."""
         return self._loop.teller.stream
 
+    def ticks_since(self) -> float | None:
+        """Return when the present tick began, on the steady clock; None between two ticks."""
+        return self._loop.ticks_since
+
     @property
     def running(self) -> bool:
         """Whether a run goes on, the drain of its goals included."""

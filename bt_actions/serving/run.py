@@ -16,6 +16,7 @@ from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.document import Tree, tree_outputs
 from bt_actions.events import Event, NodeChanged, RunEnded, StopWanted
 from bt_actions.messages.conversion import to_plain
+from bt_actions.recording.recorder import Recorder
 from bt_actions.ros.naming import server_name
 from bt_actions.running.runner import TreeRunner
 from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
@@ -34,6 +35,7 @@ class Run:
         tree: the version that was checked; a newer one does not matter any more.
         inputs: values that were checked with it.
         node: where goals are sent from; somebody spins it.
+        recorder: records the run.
         asked_by: the id of the RunTree goal, and of the run whose leaf sent it.
         begins: called with the full names of the servers that it uses, before it sends a goal.
         ended: called with the outcome, on the run's own thread, when all is over.
@@ -45,13 +47,14 @@ class Run:
         inputs: Mapping[str, object],
         node: Any,
         *,
+        recorder: Recorder | None = None,
         asked_by: tuple[str, str] = ("", ""),
         begins: Callable[[set[str]], None],
         ended: Callable[[RunOutcome], None],
     ) -> None:
         self.tree = tree
         self._inputs = inputs
-        self._node, self._asked_by = node, asked_by
+        self._node, self._asked_by, self._recorder = node, asked_by, recorder
         self._begins, self._ended = begins, ended
         self._lock = threading.Lock()
         self._runner: TreeRunner | None = None
@@ -133,6 +136,8 @@ class Run:
         runner = TreeRunner(root, node=self._node)
         runner.asked_by = self._asked_by
         runner.observe(self._note)
+        if self._recorder is not None:
+            self._recorder.record(runner.stream, runner.ticks_since)
         try:
             with self._lock:
                 self._runner = runner

@@ -20,6 +20,7 @@ from bt_actions_interfaces.srv import CheckTree, ControlTree, ListTrees
 
 from bt_actions.document import Tree
 from bt_actions.document.reading.find import tree_folder
+from bt_actions.recording.recorder import Recorder
 from bt_actions.ros.rosout import Level, Rosout
 from bt_actions.ros.serving.action_server import DeferredActionServer
 from bt_actions.ros.serving.endpoints import Endpoints
@@ -69,6 +70,7 @@ class TreeServer:
         python: the packages whose classes the trees' ``python:`` nodes may name.
         managed: be unconfigured at first, and have the services of a managed node; `lifecycle`
             changes the state from here. Otherwise goals are accepted at once.
+        recorder: records each run; closed with the server.
 
     Names, relative to the node: the action ``run_tree``; the services ``~/list_trees``,
     ``~/check_tree`` and ``~/control_tree``; the topic ``~/rejections``, which keeps the last ten.
@@ -89,11 +91,13 @@ class TreeServer:
         most: int = 10,
         python: Iterable[str] = (),
         managed: bool = False,
+        recorder: Recorder | None = None,
     ) -> None:
         folders = [trees] if isinstance(trees, str | os.PathLike) else list(trees)
         self.node = node
         self._folders = Catalog(map(tree_folder, folders)).folders
         self._python = tuple(python)
+        self._recorder = recorder
         self.catalog = Catalog(())
         self._lock = threading.RLock()
         self._answered = threading.Condition(self._lock)
@@ -168,6 +172,8 @@ class TreeServer:
         if self.lifecycle is not None:
             self.lifecycle.close()
         self._worker.shutdown(wait=False, cancel_futures=True)
+        if self._recorder is not None:
+            self._recorder.close()
 
     def halt(self, ending: Ending = Ending.HALTED, why: str = "it ends") -> None:
         """Accept nothing more, and end all runs; returns when they have ended."""
@@ -258,6 +264,7 @@ class TreeServer:
             admitted.tree,
             admitted.inputs,
             self.node,
+            recorder=self._recorder,
             asked_by=(bytes(client.goal_id.uuid).hex(), client.request.caller_run[:ECHO]),
             ended=lambda outcome: self._ended(goal, outcome),
             begins=lambda servers: self._underway.begins(goal.id, servers),

@@ -107,37 +107,37 @@ class Warned:
     message: str
 
 
+@dataclass(slots=True, eq=False)
 class State:
     """A run as it stands after the events that it has observed."""
 
-    def __init__(self) -> None:
-        self.began: RunBegan | None = None
-        self.nodes: dict[int, NodeStory] = {}
-        """By number, parents before their children."""
-        self.root = 1
-        self.now: Moment | None = None
-        """Of the latest event."""
-        self.finished: TreeFinished | None = None
-        self.ended: RunEnded | None = None
-        self.stop: StopWanted | None = None
-        """What asked the run to end; the first counts."""
-        self.stopped: list[Failure] = []
-        """What ran when the run was asked to end."""
-        self.abandoned = False
-        """Whether goals that are being drained are waited for no longer."""
-        self.paused = False
-        self.lost = 0
-        """Events that this reader was too slow for."""
-        self.variables: dict[str, VariableWritten] = {}
-        self.servers: dict[str, ServerSeen] = {}
-        self.dealt_with: deque[Failure] = deque(maxlen=KEPT)
-        """Failures that somebody went on in spite of, in the order in which that happened."""
-        self.dealt_with_in_all = 0
-        self._actions: dict[int, ActionStory] = {}
-        self._warnings: dict[int, Warned] = {}
-        self._names: dict[int, str] = {}
-        """Of all nodes, also those that are in the tree no more."""
-        self._called: dict[int, str] = {}
+    began: RunBegan | None = None
+    nodes: dict[int, NodeStory] = field(default_factory=dict)
+    """By number, parents before their children."""
+    root: int = 1
+    now: Moment | None = None
+    """Of the latest event."""
+    finished: TreeFinished | None = None
+    ended: RunEnded | None = None
+    stop: StopWanted | None = None
+    """What asked the run to end; the first counts."""
+    stopped: list[Failure] = field(default_factory=list)
+    """What ran when the run was asked to end."""
+    abandoned: bool = False
+    """Whether goals that are being drained are waited for no longer."""
+    paused: bool = False
+    lost: int = 0
+    """Events that this reader was too slow for."""
+    variables: dict[str, VariableWritten] = field(default_factory=dict)
+    servers: dict[str, ServerSeen] = field(default_factory=dict)
+    dealt_with: deque[Failure] = field(default_factory=lambda: deque(maxlen=KEPT))
+    """Failures that somebody went on in spite of, in the order in which that happened."""
+    dealt_with_in_all: int = 0
+    _actions: dict[int, ActionStory] = field(default_factory=dict)
+    _warnings: dict[int, Warned] = field(default_factory=dict)
+    _names: dict[int, str] = field(default_factory=dict)
+    """Of all nodes, also those that are in the tree no more."""
+    _called: dict[int, str] = field(default_factory=dict)
 
     # Taking in
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from bt_actions.cli.arguments.options import action_name, add_option
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.arguments.values import goal_fields, nested
+from bt_actions.cli.driving.record import add_options, recorder
 from bt_actions.cli.exits import BadInput, Exit
 from bt_actions.cli.streams.results import keep_results_apart
 from bt_actions.cli.streams.writing import note
@@ -58,6 +59,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add_option(parser, "--timeout")
     add_option(parser, "--json")
     add_option(parser, "--quiet")
+    add_options(parser, one_run=True)
     add_ros_args(parser, "; parameters (-p NAME:=VALUE) give inputs their values as of `run`")
 
 
@@ -65,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
     """Have the tree run, and see the goal to its end."""
     if args.json:
         keep_results_apart()
+    records = recorder(args)
     goal_name = f"bt-actions call {uuid.uuid4().hex[:12]}"
     name = f"bt_actions_{os.getpid()}_call"
     given = parameters(args.ros_args, name, args.namespace)
@@ -80,7 +83,7 @@ def run(args: argparse.Namespace) -> int:
         rejected = code is Exit.FAILURE and leaf.outcome is Outcome.REJECTED
         return rejection(goal_name) if rejected else (code, "")
 
-    with Session(leaf, namespace=args.namespace, name=name) as session:
+    with Session(leaf, namespace=args.namespace, name=name, recorder=records) as session:
         view: View = CallView(session.state, sys.stdout, feedback=True)
         if args.json:
             view = session.json_view(CallJsonView)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from bt_actions.cli.arguments.loading import load
 from bt_actions.cli.arguments.options import add_option, metres, node_name
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
+from bt_actions.cli.driving.record import add_options, recorder
 from bt_actions.cli.driving.sweep import sweep
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart
@@ -85,6 +86,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "; parameters (-p NAME:=VALUE, --params-file FILE) give inputs of the tree their values "
         "where --set does not",
     )
+    add_options(parser, one_run=True)
     simulated = parser.add_argument_group("simulation")
     simulated.add_argument(
         "--sim", action="store_true", help="run simulated action servers in this process"
@@ -113,6 +115,7 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         keep_results_apart()
     _refuse_without_sim(args)
+    records = recorder(args)
     root = load(
         args.tree,
         args.set,
@@ -144,6 +147,7 @@ def run(args: argparse.Namespace) -> int:
         simulation=wish,
         name=_node_name(args, tree_name(root)),
         outlook=outlook,
+        recorder=records,
     ) as session:
         view = session.view(as_json=args.json, plain=args.plain, verbose=args.verbose)
         return session.run(view, timeout=args.timeout, part_at=args.check_part)

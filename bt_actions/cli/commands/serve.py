@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from bt_actions.cli.arguments.options import MOST, add_option, count
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters, taken
+from bt_actions.cli.driving.record import add_options, recorder
 from bt_actions.cli.driving.serving import say, serve
 from bt_actions.cli.driving.sweep import sweep
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, leave, refuse_domain
@@ -23,6 +24,7 @@ from bt_actions.utilities.suggest import listing
 if TYPE_CHECKING:
     from bt_actions.cli.arguments.parser import Subparsers
     from bt_actions.cli.driving.signals import Signals
+    from bt_actions.recording.recorder import Recorder
     from bt_actions.serving import TreeServer
 
 NAME = "bt_actions_serve"
@@ -78,6 +80,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "--namespace",
         help="namespace of the node, and thereby of run_tree and every relative action name",
     )
+    add_options(parser, one_run=False)
     more = f"; the parameters {listing(_HELP)} are used where the options are not given"
     add_ros_args(parser, more)
 
@@ -87,12 +90,13 @@ def run(args: argparse.Namespace) -> int:
     given = parameters(args.ros_args, NAME, args.namespace)
     what = "parameter of bt-actions serve"
     options = _options(args, taken(given, _HELP, what, other_users=True))
+    records = recorder(args)
     code = _clean_up()
     if code is not Exit.SUCCESS:
         return code
     return serve(
         "serve",
-        lambda node: _server(node, options),
+        lambda node: _server(node, options, records),
         announce=lambda server: _announce(server, managed=options["managed"]),
         close=_close,
         conclude=_conclude,
@@ -176,7 +180,7 @@ def _checked(name: str, value: object) -> object:
     return value
 
 
-def _server(node: Any, options: Mapping[str, Any]) -> TreeServer:
+def _server(node: Any, options: Mapping[str, Any], records: Recorder | None) -> TreeServer:
     from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 
     from bt_actions.document import TreeNotFoundError
@@ -204,6 +208,7 @@ def _server(node: Any, options: Mapping[str, Any]) -> TreeServer:
             most=options["max"],
             python=options["python"],
             managed=True,
+            recorder=records,
         )
     except (OSError, TreeNotFoundError) as error:
         raise BadInput(f"--trees: {error}") from error

@@ -31,6 +31,7 @@ from bt_actions.running.shown import ShownRun
 from bt_actions.story.state import State
 
 if TYPE_CHECKING:
+    from bt_actions.recording.recorder import Recorder
     from bt_actions.ros.naming import Outlook
     from bt_actions.running.runner import TreeRunner
     from bt_actions.simulation.faults import Fault
@@ -62,8 +63,11 @@ class Session:
         simulation: SimulationWish | None = None,
         name: str = "",
         outlook: Outlook | None = None,
+        recorder: Recorder | None = None,
     ) -> None:
         """`outlook` is where the node is made, called `name`; it is the session's to close.
+
+        `recorder` records the run.
 
         Raises BadInput when ROS is not there or cannot start, or a fault fits no server."""
         with importing_ros():
@@ -71,6 +75,7 @@ class Session:
         from bt_actions.running.runner import TreeRunner as Runner
 
         self.state = State()
+        self._recorder = recorder
         with starting_ros():
             self._runner = Runner(
                 root,
@@ -139,6 +144,8 @@ class Session:
         try:
             if view.fileno < 0:  # else the view reads standard error itself
                 self._output.catch_stderr()
+            if self._recorder is not None:
+                self._recorder.record(self._runner.stream, self._runner.ticks_since)
             with Signals() as signals:
                 drive = Drive(
                     self._runner,
@@ -151,16 +158,22 @@ class Session:
                 )
                 drive.run()
                 code = drive.finish(*self._world(part_at), judge)
+                self._close_recorder()
                 if drive.abandoned:
                     self._shown.close(left=True)
                     leave(code)
                 signals.settle(code)
         finally:
+            self._close_recorder()
             with contextlib.suppress(OSError):  # the terminal may be gone
                 view.close()
         return code
 
     # Within
+
+    def _close_recorder(self) -> None:
+        if self._recorder is not None:
+            self._recorder.close()
 
     def _tick_to_end(self) -> None:
         """Run the tree, drain its goals, and close servers, node and context."""

@@ -1,0 +1,65 @@
+"""Whether a command records its runs, as its options and the environment say."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bt_actions.cli.exits import BadInput
+from bt_actions.cli.streams.writing import note
+
+if TYPE_CHECKING:
+    from bt_actions.recording.recorder import Recorder
+
+VARIABLE = "BT_ACTIONS_RECORD"
+_WORDS = ("off", "events", "all")
+
+
+def add_options(parser: argparse.ArgumentParser, *, one_run: bool) -> None:
+    """Add `--no-record` and `--record`: a file for one run, or a folder for several."""
+    group = parser.add_argument_group("recording").add_mutually_exclusive_group()
+    group.add_argument(
+        "--no-record",
+        action="store_true",
+        help=f"keep no recording; {VARIABLE}=off|events|all says so for all (events: no values)",
+    )
+    group.add_argument(
+        "--record",
+        metavar="FILE" if one_run else "DIR",
+        type=Path,
+        help="record to this .mcap file, which is never removed by itself"
+        if one_run
+        else "record each run below this folder",
+    )
+
+
+def recorder(
+    args: argparse.Namespace, say: Callable[[str], None] = lambda text: note(f"bt-actions: {text}")
+) -> Recorder | None:
+    """Return what records the command's runs, or None; raises BadInput."""
+    how = os.environ.get(VARIABLE) or "all"
+    if how not in _WORDS:
+        raise BadInput(f"{VARIABLE} is {how!r}; it is one of {', '.join(_WORDS)}")
+    path: Path | None = args.record
+    if args.no_record or (how == "off" and path is None):
+        return None
+    from bt_actions.recording.recorder import Recorder, Wish
+
+    values = how != "events"
+    if args.command == "serve":
+        return Recorder(Wish(where=path, values=values), say)
+    if path is not None:
+        _refuse(path)
+    return Recorder(Wish(first=path, values=values), say)
+
+
+def _refuse(path: Path) -> None:
+    if path.suffix != ".mcap":
+        raise BadInput(f"--record {path}: the name of a recording ends in .mcap")
+    if not path.parent.is_dir():
+        raise BadInput(f"--record {path}: there is no folder {path.parent}")
+    if path.exists():
+        raise BadInput(f"--record {path}: the file exists, and a recording replaces none")

@@ -1,0 +1,88 @@
+"""Events without the values that a robot moved by: for those who may know the story alone.
+
+What stays is which node did what, when, and with which outcome. Goals, results, feedback,
+variables, items, inputs and outputs go, and of each text what may hold values: see `_said`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from bt_actions.events.kinds import (
+    AttemptEnded,
+    Event,
+    FeedbackCame,
+    GoalChanged,
+    Logged,
+    Node,
+    NodeChanged,
+    NodesAdded,
+    RoundBegan,
+    RunBegan,
+    RunEnded,
+    TreeFinished,
+    VariableWritten,
+)
+from bt_actions.events.snapshot import HIDDEN
+
+_SETTINGS = ("timeouts", "attempts", "memory", "constants")
+"""Of a node: those that are no values of the robot's."""
+
+
+def bare(event: Event) -> Event | None:
+    """Return an event without its values, or None where nothing would be left of it."""
+    strip = _STRIPPED.get(type(event))
+    return event if strip is None else strip(event)
+
+
+def _said(text: str) -> str:
+    """A text up to its first value: what a server or a node of the user's says is all value."""
+    head = text.partition("{")[0]
+    return head.partition(": ")[0].rstrip(" ;,:")
+
+
+def _node(node: Node) -> Node:
+    kept = {name: each for name, each in node.settings.items() if name in _SETTINGS}
+    return replace(node, settings=kept)
+
+
+def _hidden(values: Any) -> dict[str, Any]:
+    return dict.fromkeys(values, HIDDEN)
+
+
+def _goal(event: GoalChanged) -> GoalChanged:
+    return replace(event, goal=None, result=None, reason=_said(event.reason))
+
+
+def _finished(event: TreeFinished) -> TreeFinished:
+    left = tuple(replace(each, fields="", reason=_said(each.reason)) for each in event.unaccounted)
+    return replace(
+        event, outputs=_hidden(event.outputs), error=_said(event.error), unaccounted=left
+    )
+
+
+_STRIPPED: dict[type[Event], Callable[[Any], Event | None]] = {
+    RunBegan: lambda event: replace(
+        event, nodes=tuple(map(_node, event.nodes)), inputs=_hidden(event.inputs), sources={}
+    ),
+    NodesAdded: lambda event: replace(event, nodes=tuple(map(_node, event.nodes))),
+    NodeChanged: lambda event: replace(
+        event, message=_said(event.message), warning=_said(event.warning)
+    ),
+    GoalChanged: _goal,
+    AttemptEnded: lambda event: replace(event, reason=_said(event.reason), seen={}),
+    FeedbackCame: lambda event: None,
+    VariableWritten: lambda event: None,
+    RoundBegan: lambda event: replace(event, item=None),
+    Logged: lambda event: None,
+    TreeFinished: _finished,
+    RunEnded: lambda event: replace(
+        event,
+        world="",
+        complaint=_said(event.complaint),
+        error=_said(event.error),
+        unaccounted=tuple(map(_said, event.unaccounted)),
+    ),
+}

@@ -1,0 +1,250 @@
+"""Where recorded runs lie, how one is found by a few letters, and which are kept.
+
+Each run has a folder, called by its time, its tree and the first letters of its id, below the state
+directory of the user. Beside the files of events stands a summary, so that a list of runs reads no
+events. A lock on the folder tells whether anybody writes or follows the run.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import re
+import shutil
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from bt_actions.utilities.plain_text import as_json, clean
+from bt_actions.utilities.suggest import did_you_mean
+from bt_actions.utilities.whole_file import replace_file
+
+FIRST = "run.mcap"
+"""The first file of a run in a folder of its own."""
+SUCCEEDED, FAILED = 20, 100
+"""Runs that are kept: of those that went well or were stopped, and of those that did not."""
+BYTES = 500_000_000
+"""Of all kept runs together."""
+_LONGEST_SUMMARY = 100_000
+_STRANGE = re.compile(r"[^\w.-]+", re.ASCII)
+
+
+class NoRun(LookupError):
+    """No recorded run is meant by what was given, or several are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What a list says of a run."""
+
+    run_id: str
+    tree: str
+    began: float
+    """Seconds since 1970."""
+    request: str = ""
+    """The UUID of the RunTree goal that it answers, or ""."""
+    status: str = ""
+    """SUCCESS, FAILURE or INVALID; "" while it goes on, and where its process was killed."""
+    stopped_by: str = ""
+    """Who asked it to end before its time: SIGINT, CANCELED, TIMEOUT, ..."""
+    exit_code: int | None = None
+    seconds: float | None = None
+    cause: str = ""
+    """Why it failed, on one line."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether it failed, was out of time, or never finished."""
+        return self.status != "SUCCESS" and self.stopped_by in ("", "TIMEOUT")
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A recorded run: its first file, and what is known of it without reading that."""
+
+    first: Path
+    summary: Summary
+    is_held: bool
+    """Whether somebody writes or follows it."""
+
+    @property
+    def parts(self) -> list[Path]:
+        """The files of the run, in order; of a long run older ones are gone."""
+        return parts_of(self.first)
+
+    @property
+    def size(self) -> int:
+        """Bytes of all its files."""
+        return sum(each.stat().st_size for each in self.parts if each.exists())
+
+
+def home() -> Path:
+    """Return the folder of all recorded runs of this user; it may not exist yet."""
+    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    return Path(state) / "bt_actions" / "runs"
+
+
+def folder_for(run_id: str, tree: str, began: float, where: Path) -> Path:
+    """Make the folder of a new run, which only this user may look into. Raises OSError."""
+    when = time.strftime("%Y%m%dT%H%M%S", time.gmtime(began))
+    name = _STRANGE.sub("_", tree)[:60] or "tree"
+    where.mkdir(mode=0o700, parents=True, exist_ok=True)
+    folder = where / f"{when}-{name}-{run_id[:8]}"
+    folder.mkdir(mode=0o700)
+    return folder
+
+
+def parts_of(first: Path) -> list[Path]:
+    """Return the files of the run that `first` begins, in order."""
+    numbered = re.compile(rf"{re.escape(first.stem)}\.(\d+)\.mcap")
+    found = [
+        (int(match[1]), each)
+        for each in first.parent.glob(f"{first.stem}.*.mcap")
+        if (match := numbered.fullmatch(each.name))
+    ]
+    return [*([first] if first.exists() else []), *(each for _, each in sorted(found))]
+
+
+# Summaries
+
+
+def summary_of(first: Path) -> Path:
+    """Return the file beside the first one that holds the run's summary."""
+    return first.with_suffix(".json")
+
+
+def write_summary(first: Path, summary: Summary) -> None:
+    """Write the summary beside the first file. Raises OSError."""
+    path = summary_of(first)
+    replace_file(path, as_json(asdict(summary)).encode())
+    path.chmod(0o600)
+
+
+def read_summary(first: Path) -> Summary | None:
+    """Return the summary, or None where none can be read."""
+    try:
+        with summary_of(first).open("rb") as file:
+            data: Any = json.loads(file.read(_LONGEST_SUMMARY))
+        text = {
+            name: clean(str(data.get(name) or ""))
+            for name in ("run_id", "tree", "request", "status", "stopped_by", "cause")
+        }
+        code, seconds = data.get("exit_code"), data.get("seconds")
+        return Summary(
+            **text,
+            began=float(data["began"]),
+            exit_code=None if code is None else int(code),
+            seconds=None if seconds is None else float(seconds),
+        )
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+# All of them
+
+
+def recorded(where: Path | None = None) -> list[Recorded]:
+    """Return all recorded runs of this user, the newest first."""
+    folder = home() if where is None else where
+    try:
+        firsts = [each / FIRST for each in folder.iterdir() if (each / FIRST).is_file()]
+    except OSError:
+        return []
+    found = [
+        Recorded(first, read_summary(first) or _guessed(first), is_held(first.parent))
+        for first in firsts
+    ]
+    return sorted(found, key=lambda each: each.summary.began, reverse=True)
+
+
+def _guessed(first: Path) -> Summary:
+    """What the folder's name says of a run whose summary is lost."""
+    _, _, rest = first.parent.name.partition("-")
+    tree, _, run_id = rest.rpartition("-")
+    return Summary(clean(run_id), clean(tree), first.stat().st_mtime)
+
+
+def find(text: str = "", where: Path | None = None) -> Path:
+    """Return the first file of the run that is meant.
+
+    A path, the first letters of an id, or a tree (its newest run); the newest of all without a
+    text. Raises NoRun.
+    """
+    path = Path(text).expanduser()
+    if text and ("/" in text or path.suffix == ".mcap"):
+        first = path / FIRST if path.is_dir() else path
+        if first.is_file():
+            return first
+        bags = sorted(path.glob("*.mcap")) if path.is_dir() else []
+        if bags:
+            return bags[0]
+        raise NoRun(f"{text} is no recording: a folder with {FIRST}, or an .mcap file, is one")
+    runs = recorded(where)
+    if not runs:
+        raise NoRun(f"no run is recorded yet in {home() if where is None else where}")
+    meant = [each for each in runs if each.summary.run_id.startswith(text.lower())]
+    if not text or len(meant) == 1:
+        return (meant or runs)[0].first
+    of_tree = [each for each in runs if each.summary.tree == text]
+    if of_tree:
+        return of_tree[0].first
+    if meant:
+        raise NoRun(f"{text} begins {len(meant)} ids: give more letters of one")
+    known = {each.summary.tree for each in runs}
+    raise NoRun(
+        f"no recorded run has an id or a tree {text!r}{did_you_mean(text, known)}: "
+        "`bt-actions runs` lists them"
+    )
+
+
+# Locks
+
+
+@contextlib.contextmanager
+def held(folder: Path, *, alone: bool = False) -> Iterator[bool]:
+    """Hold a folder, so that nobody removes it; `alone`: yield whether nobody else held it."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        try:
+            fcntl.flock(descriptor, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
+            yield True
+        except BlockingIOError:
+            yield False
+    finally:
+        os.close(descriptor)
+
+
+def is_held(folder: Path) -> bool:
+    """Whether anybody writes or follows a run."""
+    try:
+        with held(folder, alone=True) as alone:
+            return not alone
+    except OSError:
+        return False
+
+
+def prune(
+    where: Path | None = None,
+    *,
+    succeeded: int = SUCCEEDED,
+    failed: int = FAILED,
+    size: int = BYTES,
+) -> list[Recorded]:
+    """Remove the oldest runs beyond what is kept; return them. Never raises for a folder."""
+    left, gone, total = {False: succeeded, True: failed}, list[Recorded](), 0
+    for run in recorded(where):
+        mine, kind = run.size, run.summary.failed
+        total += mine
+        left[kind] -= not run.is_held
+        if run.is_held or (left[kind] >= 0 and total <= size):
+            continue
+        with contextlib.suppress(OSError), held(run.first.parent, alone=True) as alone:
+            if alone:
+                shutil.rmtree(run.first.parent)
+                total -= mine
+                gone.append(run)
+    return gone

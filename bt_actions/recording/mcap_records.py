@@ -1,0 +1,192 @@
+"""The records of an MCAP file, as many as are whole: of one that is cut, damaged or still written.
+
+A length that is damaged hides where the next record begins: it is looked for, and the damage costs
+one record. Memory is bounded by the longest record that is read, whatever the file claims.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterator
+from typing import BinaryIO, NamedTuple
+
+import zstandard
+
+MAGIC = b"\x89MCAP0\r\n"
+LONGEST = 64_000_000
+"""Bytes of one record; longer ones are passed over."""
+_WINDOW = 1_000_000
+_HEAD = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+_CHUNK = struct.Struct("<QQQII")
+SCHEMA, CHANNEL, MESSAGE, CHUNK, ATTACHMENT = 3, 4, 5, 6, 9
+_LAST = 15
+"""The highest kind of record that there is."""
+_LIKELY = re.compile(rb"[\x01-\x0f][\s\S]{4}\x00{4}")
+"""How a record begins whose length has 32 bits at most."""
+
+
+class Message(NamedTuple):
+    """A message of a channel."""
+
+    channel: int
+    log_time: int
+    """Nanoseconds since 1970."""
+    publish_time: int
+    sequence: int
+    data: bytes
+
+
+class Schema(NamedTuple):
+    """The type of channels."""
+
+    number: int
+    name: str
+    encoding: str
+    data: bytes
+
+
+class Channel(NamedTuple):
+    """A topic."""
+
+    number: int
+    schema: int
+    topic: str
+    encoding: str
+
+
+class Attachment(NamedTuple):
+    """A file beside the messages."""
+
+    name: str
+    media_type: str
+    log_time: int
+    data: bytes
+
+
+Record = Message | Schema | Channel | Attachment
+
+
+class NoMcap(ValueError):
+    """A file does not begin as MCAP does."""
+
+
+def records(file: BinaryIO) -> Iterator[Record]:
+    """Yield what is whole of the records that tell something. Raises NoMcap, OSError."""
+    if file.read(len(MAGIC)) != MAGIC:
+        raise NoMcap("no MCAP file")
+    for kind, payload in _framed(file):
+        yield from _opened(kind, payload)
+
+
+def _opened(kind: int, payload: bytes) -> Iterator[Record]:
+    """The record of a payload, or those of a chunk; nothing of what is damaged."""
+    try:
+        if kind == MESSAGE:
+            channel, sequence, log, publish = _MESSAGE.unpack_from(payload)
+            yield Message(channel, log, publish, sequence, payload[_MESSAGE.size :])
+        elif kind == CHUNK:
+            for inner, each in _split(_unpacked(payload)):
+                if inner != CHUNK:
+                    yield from _opened(inner, each)
+        elif kind == SCHEMA:
+            (number,) = struct.unpack_from("<H", payload)
+            name, at = _text(payload, 2)
+            encoding, at = _text(payload, at)
+            (size,) = struct.unpack_from("<I", payload, at)
+            yield Schema(number, name, encoding, payload[at + 4 : at + 4 + size])
+        elif kind == CHANNEL:
+            number, schema = struct.unpack_from("<HH", payload)
+            topic, at = _text(payload, 4)
+            yield Channel(number, schema, topic, _text(payload, at)[0])
+        elif kind == ATTACHMENT:
+            (log,) = struct.unpack_from("<Q", payload)
+            name, at = _text(payload, 16)
+            media, at = _text(payload, at)
+            (size,) = struct.unpack_from("<Q", payload, at)
+            yield Attachment(name, media, log, payload[at + 8 : at + 8 + size])
+    except (struct.error, ValueError, RuntimeError, zstandard.ZstdError):
+        return
+
+
+def _text(payload: bytes, at: int) -> tuple[str, int]:
+    """A text with its length before it, and where it ends."""
+    (size,) = struct.unpack_from("<I", payload, at)
+    end = at + 4 + size
+    if end > len(payload):
+        raise ValueError("a text is cut")
+    return payload[at + 4 : end].decode("utf-8", "replace"), end
+
+
+def _unpacked(payload: bytes) -> bytes:
+    """The records of a chunk."""
+    _, _, size, _, length = _CHUNK.unpack_from(payload)
+    if size > LONGEST:
+        raise ValueError("a chunk is too large")
+    at = _CHUNK.size + length
+    packing = payload[_CHUNK.size : at]
+    data = payload[at + 8 :]
+    if packing == b"zstd":
+        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+    if packing:
+        raise ValueError("a chunk is packed in an unknown way")
+    return data
+
+
+def _split(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """The records within a chunk."""
+    at = 0
+    while at + _HEAD.size <= len(data):
+        kind, length = _HEAD.unpack_from(data, at)
+        at += _HEAD.size + length
+        if at > len(data):
+            return
+        yield kind, data[at - length : at]
+
+
+def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """The records of a file, and where one is damaged the next ones."""
+    rest, is_end = b"", False
+    at = 0
+    while True:
+        while len(rest) - at < _HEAD.size and not is_end:
+            rest, at, is_end = _more(file, rest, at, _WINDOW)
+        if len(rest) - at < _HEAD.size:
+            return
+        kind, length = _HEAD.unpack_from(rest, at)
+        end = at + _HEAD.size + length
+        if 0 < kind <= _LAST and length <= LONGEST:
+            while len(rest) < end and not is_end:
+                missing = end - len(rest)
+                rest, shifted, is_end = _more(file, rest, at, max(missing, _WINDOW))
+                end -= at - shifted
+                at = shifted
+            if len(rest) >= end:
+                yield kind, rest[at + _HEAD.size : end]
+                at = end
+                continue
+        if (next_one := _found(rest, at + 1)) >= 0:
+            at = next_one
+        elif is_end:
+            return
+        else:  # nothing likely in sight: keep what a record may begin with
+            at = max(at + 1, len(rest) - _HEAD.size)
+
+
+def _more(file: BinaryIO, rest: bytes, at: int, size: int) -> tuple[bytes, int, bool]:
+    """Read on: what is there from `at` on, where that now stands, and whether it is all."""
+    data = file.read(size)
+    return rest[at:] + data, 0, not data
+
+
+def _found(rest: bytes, at: int) -> int:
+    """Where the next record begins that another one, or the end, follows; -1 for nowhere."""
+    while match := _LIKELY.search(rest, at):
+        at = match.start()
+        _, length = _HEAD.unpack_from(rest, at)
+        end = at + _HEAD.size + length
+        if end == len(rest) or (end < len(rest) and _LIKELY.match(rest, end)):
+            return at
+        at += 1
+    return -1

@@ -1,0 +1,202 @@
+"""Reads a recorded run: its events in order, and where files are missing the state behind them.
+
+What is read may be anybody's file: a damaged record, an event that is none or a number that goes
+back is passed over and counted, and names that never end make an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeAlias
+
+from py_trees.common import Status
+
+from bt_actions.events import (
+    Event,
+    EventsLost,
+    Moment,
+    NodeChanged,
+    NodesAdded,
+    RunBegan,
+    ServerSeen,
+    VariableWritten,
+    WireError,
+    from_line,
+)
+from bt_actions.recording.folders import parts_of
+from bt_actions.recording.layout import (
+    EVENTS,
+    HEARTBEAT,
+    LAYOUTS,
+    STATE,
+    TRANSITIONS,
+    BadMessage,
+    Layout,
+    decode,
+)
+from bt_actions.recording.mcap_records import Attachment, Channel, Message, NoMcap, Schema, records
+from bt_actions.recording.writing import CHANNELS, STATUSES, base_of
+from bt_actions.story.keeping import from_json
+from bt_actions.story.state import State
+
+MOST_NAMES = 1_000_000
+"""Nodes, variables and servers of one run that are read."""
+_STATUS = {number: status for status, number in STATUSES.items()}
+_BY_NUMBER = {number: LAYOUTS[topic] for topic, number in CHANNELS.items()}
+_BY_TYPE = {layout.type: layout for layout in LAYOUTS.values()}
+_EVENT, _TRANSITION = LAYOUTS[EVENTS], LAYOUTS[TRANSITIONS]
+_STATE, _HEARTBEAT = LAYOUTS[STATE], LAYOUTS[HEARTBEAT]
+Item: TypeAlias = Event | State
+
+
+class RecordingError(ValueError):
+    """A file is no recording, or none that can be read."""
+
+
+class Recording:
+    """One recorded run, read from its files in order.
+
+    Args:
+        first: its first file, or a bag that holds the events of a run.
+        run_id: which run of a bag is meant; the first that it tells of if not given.
+    """
+
+    def __init__(self, first: Path, run_id: str = "") -> None:
+        self.first, self._run_id = first, run_id
+        self.sources: dict[str, str] = {}
+        """The tree files by path, as they were recorded."""
+        self.attachments: dict[str, bytes] = {}
+        self.damaged = 0
+        """Messages that were passed over."""
+        self.last_beat: float | None = None
+        """When the process was last known to live, in seconds since 1970."""
+        self.tick = 0.0
+        """For how many seconds the tick lasted then."""
+        self._number = 0
+        self._began: RunBegan | None = None
+        self._base = 0
+        """Nanoseconds by which the log's time is ahead of the steady clock."""
+        self._names: set[str] = set()
+        self._nodes = 0
+
+    def state(self) -> State:
+        """Return how the run stands at the end of what is recorded. Raises RecordingError."""
+        state = State()
+        for item in self.items():
+            if isinstance(item, State):
+                state = item
+            else:
+                state.observe(item)
+        if state.began is None:
+            raise RecordingError(f"{self.first} holds no run")
+        return state
+
+    def items(self) -> Iterator[Item]:
+        """Yield each event, once, in order; and a whole state where what led to it is missing.
+
+        Before such a state stands an EventsLost with the number of what is missing. Raises
+        RecordingError.
+        """
+        for part in parts_of(self.first) or [self.first]:
+            for item in self._items_of(part):
+                self._check(item)
+                yield item
+
+    # Within
+
+    def _items_of(self, part: Path) -> Iterator[Item]:
+        layouts = dict(_BY_NUMBER)
+        schemas: dict[int, str] = {}
+        try:
+            with part.open("rb") as file:
+                for record in records(file):
+                    if isinstance(record, Message):
+                        layout = layouts.get(record.channel)
+                        if layout is not None:
+                            yield from self._taken(record, layout)
+                    elif isinstance(record, Schema):
+                        schemas[record.number] = record.name
+                    elif isinstance(record, Channel):
+                        found = _BY_TYPE.get(schemas.get(record.schema, ""))
+                        if found is not None:
+                            layouts[record.number] = found
+                    else:
+                        self._attached(record)
+        except NoMcap as error:
+            raise RecordingError(f"{part} is no recording: {error}") from error
+        except OSError as error:
+            raise RecordingError(f"{part} cannot be read: {error.strerror}") from error
+
+    def _attached(self, attachment: Attachment) -> None:
+        path = attachment.name.removeprefix("trees/")
+        if path != attachment.name:
+            self.sources[path] = attachment.data.decode("utf-8", "replace")
+        else:
+            self.attachments[path] = attachment.data
+
+    def _taken(self, message: Message, layout: Layout) -> Iterator[Item]:
+        """The event or the state that a message holds, unless it is known."""
+        try:
+            head, texts = decode(layout, message.data)
+            if layout is _HEARTBEAT:
+                self.last_beat, self.tick = message.log_time * 1e-9, float(head[-1])  # type: ignore[arg-type]
+            elif layout is _TRANSITION:
+                yield from self._transition(message, head)
+            elif layout in (_EVENT, _STATE) and self._is_meant(head[0]):
+                yield from self._event(texts[1]) if layout is _EVENT else self._state(texts[1])
+        except (BadMessage, WireError, TypeError, ValueError):
+            self.damaged += 1
+
+    def _is_meant(self, run_id: object) -> bool:
+        told = run_id.hex() if isinstance(run_id, bytes) else ""
+        self._run_id = self._run_id or told
+        return told == self._run_id
+
+    def _event(self, text: str) -> Iterator[Item]:
+        event = from_line(text)
+        if event.at.number <= self._number:
+            return
+        if isinstance(event, RunBegan):
+            self._begins(event)
+            event = replace(event, sources=dict(self.sources))
+        if self._began is not None or not isinstance(event, NodeChanged):
+            self._number = event.at.number - isinstance(event, EventsLost)
+            yield event
+
+    def _transition(self, message: Message, head: tuple[object, ...]) -> Iterator[Item]:
+        number, seconds, rest, node, status, by_itself = head
+        if self._began is None or not isinstance(number, int) or number <= self._number:
+            return
+        self._number = number
+        steady = (message.log_time - self._base) / 10**9
+        ros = int(seconds) + int(rest) * 1e-9  # type: ignore[call-overload]
+        at = Moment(number, steady, message.publish_time / 10**9, ros)
+        told = _STATUS.get(status, Status.INVALID)  # type: ignore[call-overload]
+        yield NodeChanged(at, int(node), told, "", bool(by_itself))  # type: ignore[call-overload]
+
+    def _state(self, text: str) -> Iterator[Item]:
+        state = from_json(text)
+        assert state.began is not None
+        if state.now is None or state.now.number <= self._number:
+            return
+        lost = state.now.number - self._number
+        self._number = state.now.number
+        self._begins(state.began)
+        yield EventsLost(state.now, lost)
+        yield state
+
+    def _begins(self, began: RunBegan) -> None:
+        self._began, self._base = began, base_of(began)
+
+    def _check(self, item: Item) -> None:
+        """Bound what a hostile file can make a reader keep."""
+        if isinstance(item, VariableWritten):
+            self._names.add(item.name)
+        elif isinstance(item, ServerSeen):
+            self._names.add(item.server)
+        elif isinstance(item, NodesAdded):
+            self._nodes += len(item.nodes)
+        if len(self._names) + self._nodes > MOST_NAMES:
+            raise RecordingError(f"{self.first} has more names than a run can have")

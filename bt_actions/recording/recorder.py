@@ -1,0 +1,220 @@
+"""Records runs on a thread of its own: one thread for all runs of a process.
+
+The thread takes the events of each run twenty times a second, lets go of Python's lock after each
+one, and writes what came as one batch: no tick waits for it. A run that is killed loses what came
+since the last batch.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from py_trees.common import Status
+
+from bt_actions.events import Event, RunBegan, RunEnded
+from bt_actions.events.stream import Reader, Stream
+from bt_actions.recording.finishing import finish_beside
+from bt_actions.recording.folders import (
+    FIRST,
+    Summary,
+    folder_for,
+    held,
+    home,
+    prune,
+    write_summary,
+)
+from bt_actions.recording.writing import RunWriter
+from bt_actions.story.state import State
+from bt_actions.story.why import why
+from bt_actions.utilities.plain_text import clean
+
+BATCH = 0.05
+"""Seconds for which events gather before they are written."""
+BEAT = 1.0
+"""Seconds between two heartbeats of a run."""
+PATIENCE = 5.0
+"""Seconds for the last events to be written, at most: a disk may hang."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What is to be recorded, and where."""
+
+    where: Path | None = None
+    """The folder that gets a folder for each run; the user's state directory if not given."""
+    first: Path | None = None
+    """The first file itself, for one run."""
+    values: bool = True
+    """Whether goals, results, feedback, variables and inputs are kept."""
+
+
+class Recorder:
+    """Writes the runs of this process, until it is closed."""
+
+    def __init__(self, wish: Wish, say: Callable[[str], None]) -> None:
+        """`say` is given, on the recorder's thread, what a user should know of a recording."""
+        self._wish, self._say = wish, say
+        self._runs: list[_Run] = []
+        self._news = threading.Event()
+        self._lock = threading.Lock()
+        self._closing = False
+        self._thread: threading.Thread | None = None
+
+    def record(self, stream: Stream, tick: Callable[[], float | None]) -> _Run:
+        """Record what happens from now on in a run, until its RunEnded.
+
+        `tick` returns when the present tick began, on the steady clock; None between two ticks.
+        """
+        run = _Run(stream, stream.reader(self._news.set), tick, self._wish, self._tell)
+        with self._lock:
+            self._runs.append(run)
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+                self._thread.start()
+        self._news.set()
+        return run
+
+    def close(self) -> None:
+        """Write what is left of all runs, ended or not."""
+        self._closing = True
+        self._news.set()
+        if self._thread is not None:
+            self._thread.join(PATIENCE)
+
+    # On the recorder's thread
+
+    def _work(self) -> None:
+        pruned = False
+        while True:
+            last = self._closing
+            self._news.clear()
+            for run in list(self._runs):
+                if run.step(time.monotonic(), last=last):
+                    self._let_go(run)
+            if last:
+                return
+            if not pruned and self._wish.first is None:
+                pruned = True
+                prune(self._wish.where)
+            self._news.wait(BEAT)
+            if not self._closing:
+                time.sleep(BATCH)
+
+    def _let_go(self, run: _Run) -> None:
+        with self._lock:
+            self._runs.remove(run)
+        if run.first is not None:
+            with contextlib.suppress(OSError):
+                finish_beside(run.first, may_wait=not self._runs)
+
+    def _tell(self, text: str) -> None:
+        with contextlib.suppress(Exception):  # a log that is closed
+            self._say(text)
+
+
+class _Run:
+    """One run that is recorded."""
+
+    def __init__(
+        self,
+        stream: Stream,
+        reader: Reader,
+        tick: Callable[[], float | None],
+        wish: Wish,
+        say: Callable[[str], None],
+    ) -> None:
+        self._stream, self._reader, self._tick = stream, reader, tick
+        self._wish, self._say = wish, say
+        self._early: list[Event] = []
+        """What came before the run began."""
+        self._writer: RunWriter | None = None
+        self._locks = contextlib.ExitStack()
+        self._beat = 0.0
+        self.first: Path | None = None
+        """The first file, once the run has begun."""
+
+    def step(self, now: float, *, last: bool) -> bool:
+        """Write what has come; return whether nothing more comes."""
+        done = last
+        for event in self._reader.take():
+            if isinstance(event, RunBegan) and self._writer is None and not self._begin(event):
+                done = True
+                break
+            self._take(event)
+            done = done or isinstance(event, RunEnded)
+            time.sleep(0)  # whoever waits for Python's lock is next
+        writer = self._writer
+        if writer is not None:
+            if now - self._beat >= BEAT and not done:
+                self._beat = now
+                began, at = self._tick(), self._stream.clock()
+                writer.beat(*at, 0.0 if began is None else max(0.0, at[0] - began))
+            writer.flush()
+            done = done or bool(writer.failed)
+        if done:
+            self._end()
+        return done
+
+    def _take(self, event: Event) -> None:
+        if self._writer is None:
+            self._early.append(event)
+        else:
+            self._writer.add(event)
+
+    def _begin(self, began: RunBegan) -> bool:
+        """Make the run's files; say it where that cannot be done."""
+        wish = self._wish
+        try:
+            first = wish.first
+            if first is None:
+                where = home() if wish.where is None else wish.where
+                first = folder_for(began.run_id, began.tree, began.at.wall, where) / FIRST
+            self._locks.enter_context(held(first.parent))
+            self._writer = RunWriter(first, began, values=wish.values, say=self._say)
+            self.first = first
+            write_summary(first, _summary(began))
+        except OSError as error:
+            self._say(f"this run is not recorded: {error.strerror} ({error.filename})")
+            return False
+        for event in self._early:
+            self._writer.add(event)
+        self._early.clear()
+        return True
+
+    def _end(self) -> None:
+        self._stream.leave(self._reader)
+        if self._writer is not None and self.first is not None:
+            with contextlib.suppress(OSError):  # which was said where it matters: of the events
+                self._writer.close()
+                if self._writer.state.began is not None:
+                    write_summary(self.first, summary(self._writer.state))
+        self._locks.close()
+
+
+def _summary(began: RunBegan) -> Summary:
+    return Summary(began.run_id, began.tree, began.at.wall, began.request)
+
+
+def summary(state: State) -> Summary:
+    """Return what a list says of a run as it stands; `state` knows its beginning."""
+    began, finished, ended = state.began, state.finished, state.ended
+    assert began is not None
+    over = finished is not None or ended is not None
+    lines = why(state) if over and state.status is not Status.SUCCESS else []
+    error = ended.error if ended is not None else ""
+    return Summary(
+        began.run_id,
+        began.tree,
+        began.at.wall,
+        began.request,
+        status=state.status.value if over else "",
+        stopped_by=state.stop.who if state.stop is not None else "",
+        exit_code=ended.exit_code if ended is not None else None,
+        seconds=state.elapsed,
+        cause=clean(" ".join(line.strip() for line in lines[:2]) or error),
+    )

@@ -1,0 +1,277 @@
+"""Writes the events of one run into its files, as they come. Never raises for what a disk does.
+
+A file is MCAP without chunks: each batch of records is one `write`, so that a process that is
+killed leaves whole records. A run that grows gets a new file every 10 MB, which begins with the
+state of the run; of a run beyond 100 MB the oldest files go, the first excepted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+
+from mcap.writer import Writer
+from py_trees.common import Status
+
+from bt_actions.events import (
+    Event,
+    FeedbackCame,
+    GoalChanged,
+    Logged,
+    Moment,
+    NodeChanged,
+    RunBegan,
+    to_line,
+)
+from bt_actions.events.bare import bare
+from bt_actions.events.wire import to_plain
+from bt_actions.messages.definition import ros2msg
+from bt_actions.recording.finishing import QOS
+from bt_actions.recording.layout import (
+    EVENTS,
+    GOALS,
+    HEARTBEAT,
+    LAYOUTS,
+    LOG,
+    STATE,
+    TRANSITIONS,
+    encode,
+    stamp,
+)
+from bt_actions.story.keeping import to_json
+from bt_actions.story.state import State
+from bt_actions.utilities.plain_text import as_json
+
+FILE = 10_000_000
+"""Bytes from which on the next event begins a new file."""
+FILES = 10
+"""Files of one run, at most."""
+THIN_FROM = 5
+"""The file from which on feedback is thinned: a run that is so long shall keep its goals."""
+THINNED = 1.0
+"""Seconds between two feedback events of one goal in a long run."""
+STATUSES = {Status.INVALID: 1, Status.RUNNING: 2, Status.SUCCESS: 3, Status.FAILURE: 4}
+_STATES = ("QUEUED", "WAITING_FOR_SERVER", "SENDING", "EXECUTING", "CANCELING", "DONE")
+_LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
+
+
+class RunWriter:
+    """The files of one run, from its first event to its last."""
+
+    def __init__(
+        self,
+        first: Path,
+        began: RunBegan,
+        *,
+        values: bool = True,
+        size: int = FILE,
+        files: int = FILES,
+        say: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        """Make the first file, which must not exist; raises OSError.
+
+        `values` tells whether goals, results and the like are kept; `size` is in bytes; `say` is
+        given what a user should know, in words.
+        """
+        self.state = State()
+        self.first, self._values, self._size, self._files = first, values, size, files
+        self._say = say
+        self._run_id = bytes.fromhex(began.run_id)
+        self._base = base_of(began)
+        self._number = 0
+        self._feedback: dict[str, float] = {}
+        """When the latest feedback of each goal was kept, in a long run."""
+        self.failed = ""
+        """Why nothing is written any more, or ""."""
+        self._buffer = io.BytesIO()
+        self._written = 0
+        self._part = 0
+        self._descriptor = _create(first)
+        self._open()
+
+    # Taking in
+
+    def add(self, event: Event) -> None:
+        """Take in an event; `flush` writes it."""
+        told: Event | None = event
+        if isinstance(event, FeedbackCame) and self._part >= THIN_FROM and self._is_spared(event):
+            return
+        if isinstance(event, RunBegan):
+            told = self._attach(event)
+        if not self._values and told is not None:
+            told = bare(told)
+        if told is None or self.failed:
+            return
+        self._number = told.at.number
+        self.state.observe(told)
+        self._put(told)
+        if self._written + self._buffer.tell() >= self._size:
+            self._begin_part()
+
+    def beat(self, steady: float, wall: float, ros: float, tick: float) -> None:
+        """Tell that the process lives; `tick` is for how many seconds the present tick lasts."""
+        at = Moment(self._number, steady, wall, ros)
+        self._message(HEARTBEAT, at, encode(LAYOUTS[HEARTBEAT], (at.number, *stamp(ros), tick)))
+
+    def flush(self) -> None:
+        """Write what has been taken in, to the kernel; what does not fit is taken back."""
+        data = self._buffer.getvalue()
+        self._buffer.seek(0)
+        self._buffer.truncate()
+        if not data or self.failed:
+            return
+        try:
+            _write_all(self._descriptor, data)
+        except OSError as error:
+            self._give_up(error)
+        else:
+            self._written += len(data)
+
+    def close(self) -> None:
+        """Write what is left, and close the file."""
+        self.flush()
+        os.close(self._descriptor)
+
+    # Within
+
+    def _open(self) -> None:
+        """Begin a file: its header, and what its topics hold."""
+        self._writer = Writer(self._buffer, use_chunking=False, enable_crcs=False)
+        self._writer.start(profile="ros2", library="bt_actions")
+        self._sequences = dict.fromkeys(LAYOUTS, 0)
+        for topic, layout in LAYOUTS.items():
+            schema = self._writer.register_schema(layout.type, "ros2msg", _schema(layout.type))
+            self._writer.register_channel(topic, "cdr", schema, QOS)
+
+    def _begin_part(self) -> None:
+        """Go on in another file, which begins with the state of the run."""
+        self.flush()
+        if self.failed:
+            return
+        self._part += 1
+        try:
+            descriptor = _create(part_of(self.first, self._part))
+        except OSError as error:
+            self._give_up(error)
+            return
+        os.close(self._descriptor)
+        self._descriptor, self._written = descriptor, 0
+        if self._part == THIN_FROM:
+            self._say("this run is long: from now on its feedback is kept once a second")
+        if self._part >= self._files:
+            part_of(self.first, self._part - self._files + 1).unlink(missing_ok=True)
+        self._open()
+        state = self.state
+        assert state.now is not None
+        at = state.now
+        head = (self._run_id, at.number, *stamp(at.ros))
+        self._message(STATE, at, encode(LAYOUTS[STATE], head, (state.tree, to_json(state))))
+
+    def _attach(self, event: RunBegan) -> RunBegan:
+        """Keep the tree's files beside the events."""
+        if self._values:
+            at = self._log_time(event.at)
+            for path, text in event.sources.items():
+                data = text.encode("utf-8", "replace")
+                self._writer.add_attachment(at, at, f"trees/{path}", "application/yaml", data)
+            plain = to_plain(replace(event, sources={}))
+            for name in ("inputs", "versions"):
+                data = as_json(plain[name]).encode()
+                self._writer.add_attachment(at, at, f"{name}.json", "application/json", data)
+        return replace(event, sources={})
+
+    def _is_spared(self, event: FeedbackCame) -> bool:
+        last = self._feedback.get(event.goal_id, -THINNED)
+        if event.at.steady - last < THINNED:
+            return True
+        if len(self._feedback) > 1000:  # of goals that are over
+            self._feedback.clear()
+        self._feedback[event.goal_id] = event.at.steady
+        return False
+
+    def _put(self, event: Event) -> None:
+        at, node = event.at, getattr(event, "node", None) or 0
+        time, status, is_all = stamp(at.ros), 0, False
+        if isinstance(event, NodeChanged):
+            status = STATUSES[event.status]
+            is_all = not event.message and not event.warning and event.due_in is None
+        elif isinstance(event, GoalChanged):
+            self._put_goal(event)
+        elif isinstance(event, Logged):
+            texts = (self._name_of(node), event.text, "", "")
+            head = (*time, _LEVELS.get(event.level, 20))
+            self._message(LOG, at, encode(LAYOUTS[LOG], head, texts))
+        if not is_all:
+            told = (self._run_id, at.number, *time, node, status)
+            data = encode(LAYOUTS[EVENTS], told, (type(event).__name__, to_line(event)))
+            self._message(EVENTS, at, data)
+        if isinstance(event, NodeChanged):  # behind its event, which says more where there is one
+            short = (at.number, *time, node, status, event.by_itself)
+            self._message(TRANSITIONS, at, encode(LAYOUTS[TRANSITIONS], short))
+
+    def _put_goal(self, event: GoalChanged) -> None:
+        at = event.at
+        state = _STATES.index(event.state) + 1 if event.state in _STATES else 0
+        goal_id = bytes.fromhex(event.goal_id)
+        head = (at.number, *stamp(at.ros), event.node, event.attempt, goal_id, state)
+        texts = (event.server, event.outcome or "", event.end or "", event.reason)
+        self._message(GOALS, at, encode(LAYOUTS[GOALS], head, texts))
+
+    def _name_of(self, node: int) -> str:
+        story = self.state.nodes.get(node)
+        return story.node.name if story is not None else ""
+
+    def _message(self, topic: str, at: Moment, data: bytes) -> None:
+        self._sequences[topic] += 1
+        self._writer.add_message(
+            CHANNELS[topic],
+            self._log_time(at),
+            data,
+            max(0, round(at.wall * 1e9)),
+            self._sequences[topic] % 2**32,
+        )
+
+    def _log_time(self, at: Moment) -> int:
+        return max(0, round(at.steady * 1e9) + self._base)
+
+    def _give_up(self, error: OSError) -> None:
+        """Leave a file of whole records, and write no more."""
+        self.failed = os.strerror(error.errno) if error.errno else str(error)
+        with contextlib.suppress(OSError):  # a disk that is gone
+            os.ftruncate(self._descriptor, self._written)
+        self._say(f"this run is not recorded any further: {self.failed} ({self.first.parent})")
+
+
+def base_of(began: RunBegan) -> int:
+    """Return the nanoseconds from the steady clock to the log's time, which so never goes back."""
+    return round(began.at.wall * 1e9) - round(began.at.steady * 1e9)
+
+
+CHANNELS = {topic: number for number, topic in enumerate(LAYOUTS, 1)}
+"""The number of each topic in a file."""
+
+
+def part_of(first: Path, number: int) -> Path:
+    """Return the file of a run that follows the first: ``run.1.mcap``."""
+    return first.with_name(f"{first.stem}.{number}.mcap") if number else first
+
+
+@lru_cache
+def _schema(name: str) -> bytes:
+    return ros2msg(name).encode()
+
+
+def _create(path: Path) -> int:
+    return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o600)
+
+
+def _write_all(descriptor: int, data: bytes) -> None:
+    """Write all of it: a full disk takes a part first, and only then says that."""
+    view = memoryview(data)
+    while view:
+        view = view[os.write(descriptor, view) :]
