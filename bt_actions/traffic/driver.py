@@ -128,6 +128,9 @@ def _what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[E
     """Yield what is to be done after a step of a goal, in order."""
     before, now = handle.standing, Standing.of(handle)
     handle.standing = now
+    turned_lost = (now.state is State.LOST) != (before.state is State.LOST)
+    if turned_lost:  # first: a process that is killed when that is told has it on record
+        yield _update_record
     if now.shown != before.shown:
         yield report
     for command in commands:
@@ -136,7 +139,7 @@ def _what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[E
         if not handle.goal.claims_resources and handle.goal.id in handle.endpoint.goals:
             handle.endpoint.domain.left[handle] = None
         yield _wake_waiting
-    if (now.off_record, now.state is State.LOST) != (before.off_record, before.state is State.LOST):
+    if now.off_record != before.off_record and not turned_lost:
         yield _update_record
     if now.state is not before.state:
         if now.state is State.DONE:

@@ -21,7 +21,7 @@ from bt_actions.events import GoalChanged
 from bt_actions.testing import VirtualBackend
 from bt_actions.testing.transport import VirtualParticipant
 from bt_actions.traffic import handover, watcher
-from bt_actions.traffic.state import GoalHandle, RunListener
+from bt_actions.traffic.state import Entry, GoalHandle, Record, RunListener
 from tests.support.trees import Gate, in_sequence, in_turn, together
 from tests.support.virtual import World
 
@@ -446,6 +446,19 @@ class TestDeadlines:
         assert runner.unaccounted == []
 
 
+class Noted(Record):
+    """A record that has everything, and takes note of what it is told."""
+
+    def __init__(self, order: list[str]) -> None:
+        self.order = order
+
+    def __contains__(self, goal_id: bytes) -> bool:
+        return True
+
+    def enter(self, goal_id: bytes, entry: Entry) -> None:
+        self.order.append("lost" if entry.lost else "sent")
+
+
 class TestServerLost:
     def test_a_server_that_leaves_is_lost(self, world: World) -> None:
         world.serve()
@@ -471,6 +484,29 @@ class TestServerLost:
         leaf = world.run(MoveRobot("m", 0.1))
         assert leaf.outcome in (Outcome.SERVER_LOST, Outcome.ACCEPT_TIMEOUT)
         assert leaf.end is End.SERVER_GONE
+
+    def test_who_is_told_of_a_lost_goal_finds_that_on_record(self, world: World) -> None:
+        """A process that is killed on that word leaves a record that says so."""
+        world.serve("1:delay_accept=60")
+        leaf = MoveRobot("m", 0.1, timeout=Timeouts(accept=60.0))
+        order: list[str] = []
+        with world.runner(leaf) as runner:
+            runner.backend.traffic.host.record = Noted(order)
+            stream = runner._loop.teller.stream
+            add = stream.add
+
+            def told(kind: type, *args: Any, **fields: Any) -> None:
+                if kind is GoalChanged and Outcome.SERVER_LOST in args:
+                    order.append("told")
+                add(kind, *args, **fields)
+
+            stream.add = told  # type: ignore[method-assign, assignment]
+            runner.observe(lambda event: None)
+            runner.start()
+            runner.until(lambda: leaf.progress().state == "SENDING")
+            world.servers["/move_robot"].close()
+            runner.wait(90.0)
+        assert order[:3] == ["sent", "lost", "told"]
 
     def test_a_server_killed_while_canceling_settles_the_deadline(self, world: World) -> None:
         world.serve("1:die=cancel")
