@@ -88,6 +88,10 @@ def decode(layout: Layout, data: bytes) -> tuple[tuple[object, ...], list[str]]:
 
 def stamp(seconds: float) -> tuple[int, int]:
     """Return seconds as the two numbers of a builtin_interfaces/Time, within its range."""
-    nanoseconds = min(max(round(seconds * 1e9), 0), (2**31 - 1) * 10**9)
-    whole, rest = divmod(nanoseconds, 10**9)
-    return whole, rest
+    return divmod(min(nanoseconds(seconds), (2**31 - 1) * 10**9), 10**9)
+
+
+def nanoseconds(seconds: float) -> int:
+    """Return seconds in nanoseconds, at least 0; divided by 10**9 they give the same seconds."""
+    whole = int(seconds)
+    return max(0, whole * 10**9 + round((seconds - whole) * 1e9))

@@ -146,9 +146,11 @@ def _split(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
-    """The records of a file, and where one is damaged the next ones."""
-    rest, is_end = b"", False
-    at = 0
+    """The records of a file, and where one is damaged the next ones.
+
+    The length of a record is believed unless another record begins before it ends.
+    """
+    rest, at, is_end = b"", 0, False
     while True:
         while len(rest) - at < _HEAD.size and not is_end:
             rest, at, is_end = _more(file, rest, at, _WINDOW)
@@ -156,22 +158,28 @@ def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
             return
         kind, length = _HEAD.unpack_from(rest, at)
         end = at + _HEAD.size + length
-        if 0 < kind <= _LAST and length <= LONGEST:
-            while len(rest) < end and not is_end:
-                missing = end - len(rest)
-                rest, shifted, is_end = _more(file, rest, at, max(missing, _WINDOW))
-                end -= at - shifted
-                at = shifted
-            if len(rest) >= end:
-                yield kind, rest[at + _HEAD.size : end]
-                at = end
-                continue
-        if (next_one := _found(rest, at + 1)) >= 0:
+        is_likely = 0 < kind <= _LAST and length <= LONGEST
+        while is_likely and len(rest) < end + _HEAD.size and not is_end:
+            missing = end + _HEAD.size - len(rest)
+            end, at_before = end - at, at
+            rest, at, is_end = _more(file, rest, at_before, max(missing, _WINDOW))
+        is_whole = is_likely and len(rest) >= end
+        next_one = end if is_whole and _follows(rest, end) else _found(rest, at + 1)
+        if is_whole and not 0 <= next_one < end:  # else its length leads beyond the next one
+            yield kind, rest[at + _HEAD.size : end]
+            at = end
+        elif next_one >= 0:
             at = next_one
         elif is_end:
             return
         else:  # nothing likely in sight: keep what a record may begin with
             at = max(at + 1, len(rest) - _HEAD.size)
+
+
+def _follows(rest: bytes, end: int) -> bool:
+    """Whether a record, the magic or nothing begins there."""
+    after = rest[end : end + len(MAGIC)]
+    return after in (b"", MAGIC) or _LIKELY.match(rest, end) is not None
 
 
 def _more(file: BinaryIO, rest: bytes, at: int, size: int) -> tuple[bytes, int, bool]:
@@ -186,7 +194,7 @@ def _found(rest: bytes, at: int) -> int:
         at = match.start()
         _, length = _HEAD.unpack_from(rest, at)
         end = at + _HEAD.size + length
-        if end == len(rest) or (end < len(rest) and _LIKELY.match(rest, end)):
+        if end <= len(rest) and _follows(rest, end):
             return at
         at += 1
     return -1

@@ -35,9 +35,10 @@ from bt_actions.recording.layout import (
     BadMessage,
     Layout,
     decode,
+    nanoseconds,
 )
 from bt_actions.recording.mcap_records import Attachment, Channel, Message, NoMcap, Schema, records
-from bt_actions.recording.writing import CHANNELS, STATUSES, base_of
+from bt_actions.recording.writing import CHANNELS, STATUSES
 from bt_actions.story.keeping import from_json
 from bt_actions.story.state import State
 
@@ -75,8 +76,8 @@ class Recording:
         self.tick = 0.0
         """For how many seconds the tick lasted then."""
         self._number = 0
-        self._began: RunBegan | None = None
-        self._base = 0
+        """Of the latest event."""
+        self._base: int | None = None
         """Nanoseconds by which the log's time is ahead of the steady clock."""
         self._names: set[str] = set()
         self._nodes = 0
@@ -144,51 +145,46 @@ class Recording:
                 self.last_beat, self.tick = message.log_time * 1e-9, float(head[-1])  # type: ignore[arg-type]
             elif layout is _TRANSITION:
                 yield from self._transition(message, head)
-            elif layout in (_EVENT, _STATE) and self._is_meant(head[0]):
-                yield from self._event(texts[1]) if layout is _EVENT else self._state(texts[1])
+            elif layout is _EVENT and self._is_meant(head[0]):
+                yield from self._event(texts[1], message.log_time, _hex(head[0]))
+            elif layout is _STATE and self._is_meant(head[0]):
+                yield from self._state(texts[1], message.log_time)
         except (BadMessage, WireError, TypeError, ValueError):
             self.damaged += 1
 
     def _is_meant(self, run_id: object) -> bool:
-        told = run_id.hex() if isinstance(run_id, bytes) else ""
-        self._run_id = self._run_id or told
-        return told == self._run_id
+        return not self._run_id or _hex(run_id) == self._run_id
 
-    def _event(self, text: str) -> Iterator[Item]:
+    def _event(self, text: str, log_time: int, run_id: str) -> Iterator[Item]:
         event = from_line(text)
-        if event.at.number <= self._number:
-            return
+        self._base = log_time - nanoseconds(event.at.steady)
+        self._number = event.at.number
         if isinstance(event, RunBegan):
-            self._begins(event)
+            self._run_id = event.run_id if event.run_id == run_id else ""
             event = replace(event, sources=dict(self.sources))
-        if self._began is not None or not isinstance(event, NodeChanged):
-            self._number = event.at.number - isinstance(event, EventsLost)
-            yield event
+        yield event
 
     def _transition(self, message: Message, head: tuple[object, ...]) -> Iterator[Item]:
         number, seconds, rest, node, status, by_itself = head
-        if self._began is None or not isinstance(number, int) or number <= self._number:
-            return
+        if self._base is None or number == self._number or not isinstance(number, int):
+            return  # the event before says more of the same
         self._number = number
         steady = (message.log_time - self._base) / 10**9
-        ros = int(seconds) + int(rest) * 1e-9  # type: ignore[call-overload]
+        ros = (int(seconds) * 10**9 + int(rest)) / 10**9  # type: ignore[call-overload]
         at = Moment(number, steady, message.publish_time / 10**9, ros)
         told = _STATUS.get(status, Status.INVALID)  # type: ignore[call-overload]
         yield NodeChanged(at, int(node), told, "", bool(by_itself))  # type: ignore[call-overload]
 
-    def _state(self, text: str) -> Iterator[Item]:
+    def _state(self, text: str, log_time: int) -> Iterator[Item]:
         state = from_json(text)
-        assert state.began is not None
         if state.now is None or state.now.number <= self._number:
             return
         lost = state.now.number - self._number
         self._number = state.now.number
-        self._begins(state.began)
+        self._base = log_time - nanoseconds(state.now.steady)
+        self._run_id = state.began.run_id if state.began is not None else ""
         yield EventsLost(state.now, lost)
         yield state
-
-    def _begins(self, began: RunBegan) -> None:
-        self._began, self._base = began, base_of(began)
 
     def _check(self, item: Item) -> None:
         """Bound what a hostile file can make a reader keep."""
@@ -200,3 +196,7 @@ class Recording:
             self._nodes += len(item.nodes)
         if len(self._names) + self._nodes > MOST_NAMES:
             raise RecordingError(f"{self.first} has more names than a run can have")
+
+
+def _hex(run_id: object) -> str:
+    return run_id.hex() if isinstance(run_id, bytes) else ""

@@ -41,6 +41,7 @@ from bt_actions.recording.layout import (
     STATE,
     TRANSITIONS,
     encode,
+    nanoseconds,
     stamp,
 )
 from bt_actions.story.keeping import to_json
@@ -82,7 +83,8 @@ class RunWriter:
         self.first, self._values, self._size, self._files = first, values, size, files
         self._say = say
         self._run_id = bytes.fromhex(began.run_id)
-        self._base = base_of(began)
+        self._base = nanoseconds(began.at.wall) - nanoseconds(began.at.steady)
+        """Nanoseconds from the steady clock to the log's time, which so never goes back."""
         self._number = 0
         self._feedback: dict[str, float] = {}
         """When the latest feedback of each goal was kept, in a long run."""
@@ -232,12 +234,12 @@ class RunWriter:
             CHANNELS[topic],
             self._log_time(at),
             data,
-            max(0, round(at.wall * 1e9)),
+            nanoseconds(at.wall),
             self._sequences[topic] % 2**32,
         )
 
     def _log_time(self, at: Moment) -> int:
-        return max(0, round(at.steady * 1e9) + self._base)
+        return max(0, nanoseconds(at.steady) + self._base)
 
     def _give_up(self, error: OSError) -> None:
         """Leave a file of whole records, and write no more."""
@@ -245,11 +247,6 @@ class RunWriter:
         with contextlib.suppress(OSError):  # a disk that is gone
             os.ftruncate(self._descriptor, self._written)
         self._say(f"this run is not recorded any further: {self.failed} ({self.first.parent})")
-
-
-def base_of(began: RunBegan) -> int:
-    """Return the nanoseconds from the steady clock to the log's time, which so never goes back."""
-    return round(began.at.wall * 1e9) - round(began.at.steady * 1e9)
 
 
 CHANNELS = {topic: number for number, topic in enumerate(LAYOUTS, 1)}

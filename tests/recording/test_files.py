@@ -1,0 +1,334 @@
+"""The files of a run: what was written is read, whatever has become of the file meanwhile."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+from pathlib import Path
+
+import pytest
+from py_trees.common import Status
+
+from bt_actions.events import (
+    Event,
+    EventsLost,
+    FeedbackCame,
+    Moment,
+    NodeChanged,
+    RunBegan,
+    VariableWritten,
+    wire,
+)
+from bt_actions.events.bare import bare
+from bt_actions.recording import mcap_records, writing
+from bt_actions.recording.finishing import finish, is_finished
+from bt_actions.recording.folders import parts_of
+from bt_actions.recording.reading import Recording, RecordingError
+from bt_actions.recording.writing import RunWriter
+from bt_actions.story.state import State
+from bt_actions.story.words import last_words
+from tests.support.every_kind import SOURCES, every_kind
+from tests.support.stories import state_of
+
+
+def written(first: Path, events: list[Event], **options: object) -> RunWriter:
+    began = next(each for each in events if isinstance(each, RunBegan))
+    writer = RunWriter(first, began, **options)  # type: ignore[arg-type]
+    for event in events:
+        writer.add(event)
+        writer.flush()
+    writer.close()
+    return writer
+
+
+def read(first: Path) -> list[Event | State]:
+    return list(Recording(first).items())
+
+
+def told(items: list[Event | State]) -> list[str]:
+    """What is compared: NaN equals NaN."""
+    return [repr(each) for each in items]
+
+
+def test_the_sample_holds_every_kind() -> None:
+    assert {type(each).__name__ for each in every_kind()} == set(wire.KINDS)
+
+
+def test_each_event_is_read_as_it_was_written(tmp_path: Path) -> None:
+    events = every_kind()
+    written(tmp_path / "run.mcap", events)
+    assert told(read(tmp_path / "run.mcap")) == told(events)
+    finish(tmp_path / "run.mcap")
+    assert is_finished(tmp_path / "run.mcap")
+    assert told(read(tmp_path / "run.mcap")) == told(events)
+
+
+def test_the_tree_files_the_inputs_and_the_versions_are_kept(tmp_path: Path) -> None:
+    written(tmp_path / "run.mcap", every_kind())
+    recording = Recording(tmp_path / "run.mcap")
+    recording.state()
+    assert recording.sources == SOURCES
+    assert set(recording.attachments) == {"inputs.json", "versions.json"}
+
+
+def test_only_its_user_may_read_it(tmp_path: Path) -> None:
+    written(tmp_path / "run.mcap", every_kind())
+    assert (tmp_path / "run.mcap").stat().st_mode & 0o777 == 0o600
+    finish(tmp_path / "run.mcap")
+    assert (tmp_path / "run.mcap").stat().st_mode & 0o777 == 0o600
+
+
+def test_a_transition_without_a_text_takes_60_bytes_and_40_when_finished(tmp_path: Path) -> None:
+    few, many = tmp_path / "few.mcap", tmp_path / "many.mcap"
+    events = every_kind()
+    at = events[1].at
+    rounds = 20_000
+    more: list[Event] = [
+        NodeChanged(
+            Moment(10 + number, at.steady + (number + 1) / 64, at.wall + (number + 1) / 64, 0.0),
+            1 + number % 3,
+            (Status.RUNNING, Status.SUCCESS)[number % 2],
+            "",
+        )
+        for number in range(rounds)
+    ]
+    written(few, events[:2])
+    written(many, events[:2] + more)
+    assert (many.stat().st_size - few.stat().st_size) / rounds <= 60
+    finish(many)
+    finish(few)
+    assert (many.stat().st_size - few.stat().st_size) / rounds <= 40
+    assert told(read(many)) == told([*events[:2], *more])
+
+
+# Long runs
+
+
+def test_a_run_that_grows_gets_more_files_and_reads_as_one(tmp_path: Path) -> None:
+    events = every_kind(rounds=40)
+    written(tmp_path / "run.mcap", events, size=60_000)
+    assert len(parts_of(tmp_path / "run.mcap")) > 2
+    assert told(read(tmp_path / "run.mcap")) == told(events)
+
+
+@pytest.mark.parametrize("finished", [False, True])
+def test_what_old_files_held_is_counted_and_the_story_is_the_same(
+    tmp_path: Path, finished: bool
+) -> None:
+    first, events = tmp_path / "run.mcap", every_kind(rounds=60)
+    written(first, events, size=40_000, files=3)
+    assert parts_of(first)[0] == first
+    assert len(parts_of(first)) == 3
+    if finished:
+        finish(first)
+    items = read(first)
+    gap = next(number for number, each in enumerate(items) if isinstance(each, State))
+    lost = items[gap - 1]
+    assert isinstance(lost, EventsLost)
+    assert gap - 1 + lost.count + len(items[gap + 1 :]) == len(events)
+    assert last_words(Recording(first).state()) == last_words(state_of(events))
+
+
+def test_the_first_file_alone_does_not_end_as_the_run_did(tmp_path: Path) -> None:
+    """The state at the head of a file counts, and not what came before it."""
+    first, events = tmp_path / "run.mcap", every_kind(rounds=60)
+    written(first, events, size=40_000, files=3)
+    for part in parts_of(first)[1:]:
+        part.unlink()
+    assert last_words(Recording(first).state()) != last_words(state_of(events))
+
+
+def test_feedback_of_a_long_run_is_thinned_and_that_is_said_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[str] = []
+    monkeypatch.setattr(writing, "THIN_FROM", 1)
+    events = every_kind(rounds=60)
+    written(tmp_path / "run.mcap", events, size=20_000, say=said.append)
+    kept = [each for each in read(tmp_path / "run.mcap") if isinstance(each, FeedbackCame)]
+    assert len(kept) < 60
+    assert len(said) == 1
+    assert "feedback" in said[0]
+    assert last_words(Recording(tmp_path / "run.mcap").state()) == last_words(state_of(events))
+
+
+def test_without_values_none_is_in_the_file(tmp_path: Path) -> None:
+    events = every_kind()
+    written(tmp_path / "run.mcap", events, values=False)
+    data = (tmp_path / "run.mcap").read_bytes()
+    for value in (
+        b"x\\ud800",
+        b'{"x":1.5}',
+        b"$bytes",
+        b"18446744073709551615",
+        b"tree: all",
+        b"said",
+        b"1.00 m",
+    ):
+        assert value not in data.replace(b"\\u0000", b"")
+    assert told(read(tmp_path / "run.mcap")) == told([e for e in map(bare, events) if e])
+
+
+# Damage
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, list[Event]]:
+    """A small file, and its events."""
+    first, events = tmp_path_factory.mktemp("sample") / "run.mcap", every_kind()
+    written(first, events)
+    return first.read_bytes(), events
+
+
+def ends_of_records(data: bytes) -> list[int]:
+    at, ends = len(mcap_records.MAGIC), []
+    while at < len(data):
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+        ends.append(at)
+    return ends
+
+
+def test_a_file_that_is_cut_at_any_byte_is_read_up_to_there(
+    tmp_path: Path, sample: tuple[bytes, list[Event]]
+) -> None:
+    data, events = sample
+    whole, path = ends_of_records(data), tmp_path / "cut.mcap"
+    before = told(list[Event | State](events))
+    for end in range(len(mcap_records.MAGIC), len(data)):
+        path.write_bytes(data[:end])
+        if end in whole or end % 7 == 0:
+            items = told(read(path))
+            assert items == before[: len(items)]
+            with path.open("rb") as file:
+                found = sum(1 for _ in mcap_records.records(file))
+            heads = 1  # the header tells nothing
+            assert found == sum(each <= end for each in whole) - (heads if end >= whole[0] else 0)
+    for end in range(len(mcap_records.MAGIC)):
+        path.write_bytes(data[:end])
+        with pytest.raises(RecordingError, match="no recording"):
+            read(path)
+
+
+def test_one_damaged_byte_costs_one_message(
+    tmp_path: Path, sample: tuple[bytes, list[Event]]
+) -> None:
+    data, events = sample
+    chance, path = random.Random(36), tmp_path / "damaged.mcap"
+    before = [(type(each), each.at.number) for each in events]
+    layouts = ends_of_records(data)
+    first_message = next(end for end in layouts if data[end] == mcap_records.MESSAGE)
+    for _ in range(1000):
+        at = chance.randrange(first_message, len(data))
+        path.write_bytes(
+            data[:at] + bytes([data[at] ^ (1 << chance.randrange(8))]) + data[at + 1 :]
+        )
+        items = [
+            (type(each), each.at.number) for each in read(path) if not isinstance(each, State)
+        ]
+        missing = set(before) - set(items)
+        assert len(missing) <= 1, f"byte {at}"
+        # of what was read nothing is out of order; the damaged one may read as another text
+        assert [each for each in items if each in before] == [
+            each for each in before if each in items
+        ]
+
+
+@pytest.mark.parametrize("finished", [False, True])
+def test_no_damage_makes_more_than_an_error_in_words(
+    tmp_path: Path, sample: tuple[bytes, list[Event]], finished: bool
+) -> None:
+    data, _ = sample
+    chance, path = random.Random(37), tmp_path / "run.mcap"
+    if finished:
+        path.write_bytes(data)
+        finish(path)
+        data = path.read_bytes()
+    for _ in range(300):
+        damaged = bytearray(data)
+        for _ in range(chance.randrange(1, 20)):
+            damaged[chance.randrange(len(damaged))] = chance.randrange(256)
+        path.write_bytes(damaged)
+        try:
+            read(path)
+        except RecordingError:
+            continue
+
+
+def test_a_chunk_that_claims_to_be_huge_is_passed_over(tmp_path: Path) -> None:
+    import struct
+
+    import zstandard
+
+    packed = zstandard.compress(bytes(100_000_000))
+    chunk = (
+        struct.pack("<QQQII", 0, 0, 100_000_000, 0, 4) + b"zstd" + struct.pack("<Q", len(packed))
+    )
+    record = struct.pack("<BQ", mcap_records.CHUNK, len(chunk + packed)) + chunk + packed
+    (tmp_path / "bomb.mcap").write_bytes(mcap_records.MAGIC + record)
+    assert read(tmp_path / "bomb.mcap") == []
+
+
+def test_names_that_never_end_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from bt_actions.recording import reading
+
+    events = every_kind()
+    monkeypatch.setattr(reading, "MOST_NAMES", 50)
+    more = [VariableWritten(Moment(90 + n, 200.0, 200.0, 0.0), f"v{n}", 1, None) for n in range(60)]
+    written(tmp_path / "run.mcap", [*events[:-1], *more])
+    with pytest.raises(RecordingError, match="more names"):
+        read(tmp_path / "run.mcap")
+
+
+def test_a_file_that_is_none_is_said_to_be_none(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").write_text("tree: pick_and_place\n")
+    with pytest.raises(RecordingError, match=r"run\.mcap is no recording"):
+        read(tmp_path / "run.mcap")
+    with pytest.raises(RecordingError, match="cannot be read"):
+        read(tmp_path / "none.mcap")
+
+
+# A full disk
+
+
+def test_a_full_disk_leaves_whole_records_and_is_said_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A full disk takes a part of what is written first, and only then says that."""
+    first, events, said = tmp_path / "run.mcap", every_kind(rounds=20), list[str]()
+    room, write = [30_000], os.write
+
+    def full(descriptor: int, data: bytes) -> int:
+        taken = min(len(data), room[0])
+        room[0] -= taken
+        if not taken:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return write(descriptor, data[:taken])
+
+    monkeypatch.setattr(writing.os, "write", full)
+    writer = written(first, events, say=said.append)
+    monkeypatch.undo()
+    assert writer.failed
+    assert len(said) == 1
+    assert "No space left" in said[0]
+    assert first.stat().st_size in ends_of_records(first.read_bytes())
+    items = told(read(first))
+    assert 0 < len(items) < len(events)
+    assert items == told(list[Event | State](events))[: len(items)]
+
+
+def test_of_a_bag_with_two_runs_one_is_read(tmp_path: Path) -> None:
+    from dataclasses import replace as changed
+
+    one = every_kind()
+    other: list[Event] = [
+        changed(each, run_id="0f" * 16, tree="other") if isinstance(each, RunBegan) else each
+        for each in every_kind()
+    ]
+    written(tmp_path / "one.mcap", one)
+    written(tmp_path / "other.mcap", other)
+    head, tail = ((tmp_path / name).read_bytes() for name in ("one.mcap", "other.mcap"))
+    (tmp_path / "bag.mcap").write_bytes(head + tail[len(mcap_records.MAGIC) :])
+    state = Recording(tmp_path / "bag.mcap").state()
+    assert state.tree == "all"
+    assert Recording(tmp_path / "bag.mcap", run_id="0f" * 16).state().tree == "other"
