@@ -71,7 +71,7 @@ def finish_beside(first: Path, *, may_wait: bool) -> None:
             finish(first)
         return
     subprocess.Popen(
-        [sys.executable, "-m", __name__, str(first)],
+        [sys.executable, "-P", "-m", __name__, str(first)],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

@@ -223,9 +223,7 @@ def test_one_damaged_byte_costs_one_message(
         path.write_bytes(
             data[:at] + bytes([data[at] ^ (1 << chance.randrange(8))]) + data[at + 1 :]
         )
-        items = [
-            (type(each), each.at.number) for each in read(path) if not isinstance(each, State)
-        ]
+        items = [(type(each), each.at.number) for each in read(path) if not isinstance(each, State)]
         missing = set(before) - set(items)
         assert len(missing) <= 1, f"byte {at}"
         # of what was read nothing is out of order; the damaged one may read as another text
