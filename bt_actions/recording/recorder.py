@@ -179,7 +179,9 @@ class _Run:
             self.first = first
             write_summary(first, _summary(began))
         except OSError as error:
-            self._say(f"this run is not recorded: {error.strerror} ({error.filename})")
+            remedy = "set XDG_STATE_HOME to a folder that can be written, or say --no-record"
+            where = f"{error.filename}: {error.strerror}"
+            self._say(f"this run is not recorded: {where}; {remedy}")
             return False
         for event in self._early:
             self._writer.add(event)

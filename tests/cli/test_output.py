@@ -67,7 +67,7 @@ def test_help_without_a_standard_output_is_no_error() -> None:
 
 def bare(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
     """Call `bt-actions` with hardly a variable but `more`."""
-    kept = ("PATH", "ROS_DOMAIN_ID")
+    kept = ("PATH", "ROS_DOMAIN_ID", "XDG_STATE_HOME")
     environment = {name: os.environ[name] for name in kept if name in os.environ}
     return subprocess.run(
         [sys.executable, "-m", "bt_actions.cli", *arguments],
@@ -88,6 +88,16 @@ def bare(*arguments: str, **more: str) -> subprocess.CompletedProcess[str]:
 def test_a_run_works_all_the_same(domain: int, variables: dict[str, str]) -> None:
     done = bare(*DEMO, **variables)
     assert (done.returncode, done.stderr) == (0, "")
+    assert "SUCCESS after" in done.stdout.splitlines()[-1]
+
+
+def test_a_recording_that_cannot_be_is_said_on_one_line_and_the_tree_goes_on(domain: int) -> None:
+    done = bare(*DEMO, XDG_STATE_HOME="/proc/1/nowhere")
+    assert done.returncode == 0
+    assert done.stderr == (
+        "bt-actions: this run is not recorded: /proc/1/nowhere: No such file or directory; "
+        "set XDG_STATE_HOME to a folder that can be written, or say --no-record\n"
+    )
     assert "SUCCESS after" in done.stdout.splitlines()[-1]
 
 
