@@ -180,8 +180,8 @@ class _Run:
             write_summary(first, _summary(began))
         except OSError as error:
             remedy = "set XDG_STATE_HOME to a folder that can be written, or say --no-record"
-            where = f"{error.filename}: {error.strerror}"
-            self._say(f"this run is not recorded: {where}; {remedy}")
+            folder = f"{error.filename}: {error.strerror}"
+            self._say(f"this run is not recorded: {folder}; {remedy}")
             return False
         for event in self._early:
             self._writer.add(event)
