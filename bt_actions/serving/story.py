@@ -36,8 +36,9 @@ def ends(outcome: RunOutcome, seconds: float | None) -> str:
     elif outcome.code in _STOPPED:
         status = Status.INVALID
     left = "" if outcome.settled else ", and not all of its goals are accounted for"
-    why = f": {outcome.why}" if outcome.why else ""
-    return f"ends: {verdict(status, seconds)}{left}{why}"
+    why = outcome.why
+    before = ":\n" if "\n" in why else ": " if why else ""  # each line of a log has a length
+    return f"ends: {verdict(status, seconds)}{left}{before}{why}"
 
 
 def warnings_of(entry: Entry) -> list[Said]:

@@ -53,6 +53,8 @@ def test_large_inputs_are_told_in_short(tree: Tree) -> None:
     [
         (RunOutcome(Code.NONE), 1.234, "ends: SUCCESS after 1.23 s"),
         (RunOutcome(20104, "Go: ABORTED"), 2.0, "ends: FAILURE after 2.00 s: Go: ABORTED"),
+        (RunOutcome(20104, "Go: ABORTED\n  x.yaml:8:7"), 2.0,
+         "ends: FAILURE after 2.00 s:\nGo: ABORTED\n  x.yaml:8:7"),
         (RunOutcome(Code.CANCELED, "a client canceled it"), 0.5,
          "ends: STOPPED after 0.50 s: a client canceled it"),
         (RunOutcome(Code.HALTED, "it was halted before it began"), None,
