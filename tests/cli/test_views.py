@@ -386,7 +386,7 @@ def test_json_tells_what_a_goal_was_sent_what_came_of_it_and_when(
     assert (sent["goal"], sent["result"]) == ({"distance": 2.0}, None)
     assert came["feedback"] == {"data": [1, 2]}
     assert (done["goal"], done["result"]) == (None, {"pose": None})
-    assert (judged["reason"], judged["again_in"], judged["expect"]) == ("a fault", 0.5, None)
+    assert (judged["reason"], judged["again_in"], judged["expect"]) == ("a fault", 0.5, "")
     for each, at in ((sent, 0.5), (came, 1.0), (done, 1.5), (judged, 2.0)):
         assert (each["id"], each["path"]) == (leaf.id, ["Deliver", "Work", "Step 0"])
         assert (each["time"], each["wall"]) == (at, 1e9 + 100.0 + at)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any, TextIO
+
+from py_trees.common import Status
 
 from bt_actions.cli.views.view import View
 from bt_actions.events import (
@@ -24,6 +27,15 @@ from bt_actions.story.state import Failure, State
 from bt_actions.story.why import why
 from bt_actions.story.words import stopping_text
 from bt_actions.utilities.plain_text import as_json
+
+KINDS = {
+    NodeChanged: "node",
+    RoundBegan: "round",
+    GoalChanged: "goal",
+    FeedbackCame: "feedback",
+    AttemptEnded: "attempt",
+}
+"""The events of a node that are written, as `event` has them."""
 
 
 class JsonView(View):
@@ -47,44 +59,8 @@ class JsonView(View):
                         "nodes": [_node(node) for node in event.nodes],
                     }
                 )
-            case NodeChanged():
-                self._of(event, event.node, "node", status=event.status.value,
-                         message=event.message)  # fmt: skip
-            case GoalChanged():
-                self._of(
-                    event,
-                    event.node,
-                    "goal",
-                    name=self._state.nodes[event.node].node.name,
-                    server=event.server,
-                    goal_id=event.goal_id,
-                    attempt=event.attempt,
-                    state=event.state,
-                    outcome=event.outcome,
-                    end=event.end,
-                    reason=event.reason,
-                    goal=plain(event.goal),
-                    result=plain(event.result),
-                )
-            case AttemptEnded():
-                self._of(
-                    event,
-                    event.node,
-                    "attempt",
-                    goal_id=event.goal_id,
-                    attempt=event.attempt,
-                    outcome=event.outcome,
-                    reason=event.reason,
-                    expect=event.expect or None,
-                    seen=plain(event.seen),
-                    again_in=event.again_in,
-                )
-            case FeedbackCame():
-                self._of(event, event.node, "feedback", goal_id=event.goal_id,
-                         feedback=plain(event.feedback))  # fmt: skip
-            case RoundBegan():
-                self._of(event, event.node, "round", round=event.number, of=event.of,
-                         item=plain(event.item))  # fmt: skip
+            case _ if type(event) in KINDS:
+                self._of_node(event)
             case StopWanted(abandons=False):
                 self.say(stopping_text(self._state))
 
@@ -131,17 +107,18 @@ class JsonView(View):
             "complaint": ended.complaint or None,
         }
 
-    def _of(self, event: Event, node: int, kind: str, **fields: object) -> None:
-        """Write an event of one node."""
-        story = self._state.nodes[node]
+    def _of_node(self, event: Any) -> None:
+        """Write an event of one node, with all that it has."""
+        has = {each.name: plain(getattr(event, each.name)) for each in fields(event)[1:]}
+        node = has.pop("node")
         about = {
-            "event": kind,
+            "event": KINDS[type(event)],
             "time": round(event.at.steady - self._state.started, 4),
             "wall": event.at.wall,
             "id": node,
             "path": list(self._state.path(node)),
         }
-        self._write(about | fields | {"place": story.node.place or None})
+        self._write(about | has | {"place": self._state.nodes[node].node.place or None})
 
     def _failure(self, failure: Failure) -> dict[str, object]:
         action = failure.action
@@ -185,8 +162,10 @@ def action_data(action: ActionStory, now: float) -> dict[str, object]:
     }
 
 
-def plain(value: Value | Mapping[str, Value]) -> Any:
+def plain(value: Value | Mapping[str, Value] | Status) -> Any:
     """Return a snapshot as JSON says it: bytes as numbers, and of what was cut the beginning."""
+    if isinstance(value, Status):
+        return value.value
     if isinstance(value, Cut):
         return plain(value.head)
     if isinstance(value, Mapping):
