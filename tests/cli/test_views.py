@@ -31,7 +31,7 @@ from bt_actions.story.state import State
 from bt_actions.story.words import last_words
 from bt_actions.testing import ScriptedServer, VirtualNetwork, VirtualRunner
 from tests.support.told_trees import FakeAction, FakeNode, Story
-from tests.support.trees import together
+from tests.support.trees import in_sequence, together
 
 
 @pytest.fixture
@@ -232,19 +232,22 @@ def test_an_output_is_one_line_whatever_it_holds(story: Story) -> None:
     assert f"x: {TAMED}" in last_words(state)
 
 
-def test_what_one_tick_ended_comes_before_what_it_began(
-    leaves: list[FakeNode], story: Story
-) -> None:
-    begun = story.node(leaves[0], Status.RUNNING)
-    lines = Lines(story.began, begun, story.goal(leaves[0], "EXECUTING"), verbose=True)
-    lines.feed(story.goal(leaves[0], "DONE", outcome=Outcome.SUCCEEDED, end=End.SUCCEEDED))
-    lines.feed(story.goal(leaves[1], "SENDING"), story.goal(leaves[1], "EXECUTING"))
-    lines.feed(story.node(leaves[0], Status.SUCCESS), story.node(leaves[1], Status.RUNNING))
-    assert lines.said == [
-        "goal     Deliver / Work / Step 0: executing on move_robot",
-        "SUCCESS  Deliver / Work / Step 0",
-        "goal     Deliver / Work / Step 1: sending a goal to move_robot",
-        "goal     Deliver / Work / Step 1: executing on move_robot",
+def test_what_one_tick_ended_comes_before_what_it_began() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, Move, "move_robot")
+    runner = VirtualRunner(in_sequence(*(MoveRobot(name, 1.0) for name in "ab")), network)
+    assert runner.run() is Status.SUCCESS
+    assert Lines(*runner.events, verbose=True).said == [
+        "goal     sequence / a: waiting for the server /move_robot",
+        "goal     sequence / a: sending a goal to /move_robot",
+        "RUNNING  sequence",
+        "goal     sequence / a: executing on /move_robot",
+        "SUCCESS  sequence / a",
+        "goal     sequence / b: waiting for the server /move_robot",
+        "goal     sequence / b: sending a goal to /move_robot",
+        "goal     sequence / b: executing on /move_robot",
+        "SUCCESS  sequence / b",
+        "SUCCESS  sequence",
     ]
 
 

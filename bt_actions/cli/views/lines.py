@@ -16,7 +16,6 @@ from bt_actions.events import (
     RoundBegan,
     RunBegan,
     StopWanted,
-    TreeFinished,
 )
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory
@@ -33,9 +32,8 @@ LASTING = 1.0
 class LineView(View):
     """One line a change of a node, one for a goal under way, and one for an attempt that failed.
 
-    The lines of a goal come after the news of the tick in which it was sent. A goal that waits, is
-    sent or is canceled gets a line when that lasts; one whose end comes after its outcome, at its
-    end. What is told of a node is told again in each round of a loop.
+    A goal that waits, is sent or is canceled gets a line when that lasts; one whose end comes after
+    its outcome, at its end. What is told of a node is told again in each round of a loop.
     """
 
     def __init__(self, state: State, out: TextIO, *, verbose: bool = False) -> None:
@@ -46,8 +44,6 @@ class LineView(View):
         self._nodes: dict[int, Status] = {}
         """The status that each node's line told."""
         self._goals: dict[int, object] = {}
-        self._held: dict[int, list[tuple[float, str]]] = {}
-        """By leaf: what happened before the news of its tick."""
         self._passing: dict[int, tuple[float, str]] = {}
         """By leaf: since when its goal is in a state that is only told when it lasts."""
 
@@ -67,9 +63,6 @@ class LineView(View):
                     self._nodes.pop(node, None)
             case StopWanted(abandons=False):
                 self._write(stopping_text(self._state))
-            case TreeFinished():
-                for key in list(self._held):
-                    self._release(key)
 
     def due(self, now: float) -> None:
         """Write what has lasted long enough."""
@@ -80,7 +73,6 @@ class LineView(View):
 
     def _node(self, event: NodeChanged) -> None:
         story = self._state.nodes[event.node]
-        self._release(event.node)
         if event.status is Status.SUCCESS:
             self._passing.pop(event.node, None)
         told = OVER if story.node.server else (Status.RUNNING, *OVER)  # its goal tells of RUNNING
@@ -115,9 +107,9 @@ class LineView(View):
         if is_over and (event.state == DONE or event.end is not End.UNKNOWN):
             if action.goals[event.goal_id].verdict is not None:  # else that is to come
                 end = "end not known" if event.end is End.UNKNOWN else f"ended {event.end}"
-                self._tell(event, f"{_which(action, event)}{end}")
+                self._goal_line(event.at.steady, key, f"{_which(action, event)}{end}")
         elif not is_over and (self._verbose or event.state == "EXECUTING"):
-            self._tell(event, goal_text(action))
+            self._goal_line(event.at.steady, key, goal_text(action))
         else:
             self._passing[key] = (event.at.steady, goal_text(action))
 
@@ -126,24 +118,7 @@ class LineView(View):
         if event.outcome is not Outcome.SUCCEEDED:
             text = attempt_text(action, action.goals[event.goal_id])
             again = f"; again in {event.again_in:.1f} s" if event.again_in else ""
-            self._tell(event, f"{_which(action, event)}{text}{again}")
-
-    def _tell(self, event: GoalChanged | AttemptEnded, text: str) -> None:
-        if self._is_ahead(event):
-            self._held.setdefault(event.node, []).append((event.at.steady, text))
-        else:
-            self._goal_line(event.at.steady, event.node, text)
-
-    def _is_ahead(self, event: GoalChanged | AttemptEnded) -> bool:
-        """Whether the leaf has still to tell of the visit in which the goal was begun."""
-        story, latest = self._state.nodes[event.node], self._state.action(event.node).latest
-        begun = latest is not None and latest.began.number > story.number
-        return begun and story.status is not Status.RUNNING
-
-    def _release(self, key: int) -> None:
-        """Write the lines of a leaf that were held back."""
-        for at, text in self._held.pop(key, ()):
-            self._goal_line(at, key, text)
+            self._goal_line(event.at.steady, event.node, f"{_which(action, event)}{text}{again}")
 
     def say(self, text: str) -> None:
         """Write `text` on a line of its own."""
