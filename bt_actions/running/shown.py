@@ -9,7 +9,6 @@ import threading
 from typing import TYPE_CHECKING
 
 from py_trees.behaviour import Behaviour
-from py_trees.common import Status
 
 from bt_actions import wiring
 from bt_actions.document import given_inputs
@@ -65,7 +64,7 @@ class ShownRun:
             return
         state, name = self._state, self._state.tree
         failed = "" if error is None else in_words(error)
-        if state.status is Status.FAILURE:
+        if state.finished is not None and (state.finished.error or state.failures):
             failed = why_text(state)
         if failed:
             self._rosout.say("error", f"{name}: {failed}")

@@ -105,7 +105,8 @@ def outcome_of(
     if succeeded:
         code, why = Code.UNKNOWN if left else Code.NONE, ""
     elif error is not None:
-        code, why = Code.EXCEPTION, clean(str(error))
+        is_told = state.finished is not None and state.finished.error
+        code, why = Code.EXCEPTION, why_text(state) if is_told else clean(str(error))
     elif ending is not None:
         code, why = ending.value
     else:

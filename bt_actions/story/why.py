@@ -6,6 +6,7 @@ terminal, `--json`, RunTree's result, the diagnostics, a failed assertion over a
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterator
 
@@ -30,6 +31,8 @@ BELOW = 5
 """Lines of a run below a RunTree leaf."""
 _BELOW = "has failed:"
 """Ends the line before these."""
+_FIRST = re.compile(rf"\A(.*)\n  (?:(.*{_BELOW})\n    )?")
+"""The path of a cause; of a RunTree leaf, also what stands before the cause below."""
 _WAITS = {
     "QUEUED": "waits for its turn on",
     "WAITING_FOR_SERVER": "waits for the server",
@@ -88,7 +91,7 @@ def why_text(state: State, now: float | None = None) -> str:
     That line has the cause as well as its place in the tree; of a RunTree leaf, the cause below.
     """
     text = "\n".join(why(state, now))
-    return text.replace(f"{_BELOW}\n    ", f"{_BELOW} ", 1).replace("\n  ", ": ", 1)
+    return _FIRST.sub(lambda line: f"{line[1]}: {f'{line[2]} ' if line[2] else ''}", text)
 
 
 # While it runs

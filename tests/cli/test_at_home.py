@@ -10,13 +10,14 @@ from typing import Any
 
 import pytest
 
-from bt_actions import TreeRunner, load_tree
+from bt_actions import TreeError, TreeRunner, load_tree
 from bt_actions.cli.arguments.ros_arguments import as_inputs, parameters
 from bt_actions.document import tree_inputs
 from bt_actions.running.shown import ShownRun
 from tests.cli.conftest import Start
 from tests.support.parameter_dump import dumped
 from tests.support.processes import Host
+from tests.support.trees import Raises
 from tests.support.waiting import until
 
 INPUTS = """\
@@ -146,6 +147,21 @@ def test_a_program_of_the_users_shows_its_runs_so_too(watcher: Watcher, tmp_path
         ends = watcher.hears("of_a_program", "ends")[-1]
     assert begins == (20, f"quick begins ({path}) with speed=0.2")
     assert ends[1].startswith("quick ends: SUCCESS after ")
+
+
+def test_what_a_behaviour_raised_in_a_program_is_told_on_rosout(watcher: Watcher) -> None:
+    root = Raises("bad", "update")
+    with TreeRunner(root, name="of_a_bad_program") as runner:
+        shown = ShownRun(runner, root)
+        runner.on_close(shown.close)
+        with pytest.raises(TreeError):
+            runner.run()
+        watcher.hears("of_a_bad_program", "begins")
+        threading.Thread(target=runner.shutdown).start()
+        _, (level, reason), (_, ends) = watcher.hears("of_a_bad_program", "ends")
+    assert level == 40
+    assert "  bad: tick raised RuntimeError: on purpose in update (" in reason
+    assert ends.startswith("bad ends: STOPPED after ")
 
 
 def test_a_run_that_is_ended_by_a_signal_says_so_last_of_all(

@@ -193,3 +193,19 @@ def test_of_two_leaves_of_one_name_that_were_stopped_the_path_tells_which() -> N
     )
     stopped = [line for line in lines(state) if "it stopped" in line]
     assert sorted(stopped) == ["  it stopped Left / Wait", "  it stopped Right / Wait"]
+
+
+def test_what_a_behaviour_raised_is_all_of_the_first_line(story: Story, leaf: FakeNode) -> None:
+    story.root.kind = "fallback"
+    other = FakeNode("Other", kind="check")
+    told = story.add(other, story.root)
+    state = story.told(
+        told,
+        *story.fail(leaf, "a fault"),
+        story.node(other, Status.SUCCESS),
+        story.node(story.root, Status.SUCCESS),
+        story.finish(Status.INVALID, error="Deliver/Other: tick raised OSError (x.py:3)"),
+    )
+    first, second, *_ = why_text(state).splitlines()
+    assert first.endswith("  Deliver/Other: tick raised OSError (x.py:3)")
+    assert second == "failed before, and dealt with:"
