@@ -17,8 +17,8 @@ from bt_actions.messages.fields import constants
 _PHASES = ("queue", "server", "accept", "result", "feedback", "cancel")
 
 
-def describe(node: Behaviour, number: int, parent: int | None) -> Node:
-    """Return what is told of a node, which has this number."""
+def describe(node: Behaviour, number: int, parent: int | None, index: int | None = None) -> Node:
+    """Return what is told of a node, which has this number, and this place among its siblings."""
     server, action = action_of(node) or ("", "")
     return Node(
         number,
@@ -29,6 +29,7 @@ def describe(node: Behaviour, number: int, parent: int | None) -> Node:
         server,
         action,
         _settings(node),
+        index,
     )
 
 

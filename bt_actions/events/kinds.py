@@ -50,6 +50,8 @@ class Node:
     settings: Mapping[str, Value] = field(default_factory=dict)
     """The policies of the node: `timeouts` in seconds by phase, `attempts`, `expect`, `memory`,
     `constants` by message (``{"feedback": {"status": {"2": "MOVING"}}}``)."""
+    index: int | None = None
+    """Of a node that was inserted: its place among its siblings, from 0."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -108,10 +108,10 @@ class TreeTeller(Teller):
         gone = {each for each in set(self.numbers).difference(nodes) if _is_over(each)}
         if gone:
             self.stream.add(NodesRemoved, tuple(sorted(self.numbers.pop(each) for each in gone)))
-        if new := self._new(nodes):
+        if new := self._new(nodes, are_inserted=True):
             self.stream.add(NodesAdded, new)
 
-    def _new(self, nodes: Iterable[Behaviour]) -> tuple[Node, ...]:
+    def _new(self, nodes: Iterable[Behaviour], *, are_inserted: bool = False) -> tuple[Node, ...]:
         """Give the nodes that have none their numbers; return what is told of them."""
         numbers, found = self.numbers, []
         for node in nodes:
@@ -119,7 +119,8 @@ class TreeTeller(Teller):
                 self._last += 1
                 numbers[node] = self._last
                 parent = None if node.parent is None else numbers.get(node.parent)
-                found.append(describe(node, self._last, parent))
+                index = node.parent.children.index(node) if are_inserted and node.parent else None
+                found.append(describe(node, self._last, parent, index))
         return tuple(found)
 
     def changed(self, node: Behaviour) -> None:

@@ -201,7 +201,8 @@ class State:
             self.nodes[node.id] = NodeStory(node)
             self._names[node.id] = node.name
             if node.parent in self.nodes:
-                self.nodes[node.parent].children.append(node.id)
+                siblings = self.nodes[node.parent].children
+                siblings.insert(len(siblings) if node.index is None else node.index, node.id)
         self._called.clear()
 
     def _remove(self, nodes: tuple[int, ...]) -> None:

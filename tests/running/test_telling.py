@@ -182,6 +182,17 @@ class TestNodes:
         first = next(e for e in runner.events if isinstance(e, NodeChanged) and e.node == 3)
         assert first.at.number > added.at.number
 
+    def test_that_are_inserted_stand_in_their_place_among_their_siblings(self) -> None:
+        root = in_sequence(*(Does(name, lambda tick: None, ticks=30) for name in "bd"), name="root")
+        runner = VirtualRunner(root)
+        runner.start()
+        runner.advance(1.0)
+        root.insert_child(Does("a", lambda tick: None), 0)
+        root.insert_child(Does("c", lambda tick: None), 2)
+        runner.advance(1.0)
+        names = [runner.state.nodes[each].node.name for each in runner.state.in_order()]
+        assert names == ["root", "a", "b", "c", "d"]
+
     def test_of_a_tree_that_cannot_be_set_up_are_told_of_all_the_same(self) -> None:
         class Broken(Does):
             def setup(self, **kwargs: Any) -> None:
