@@ -218,7 +218,8 @@ class StopWanted(Event):
     """Somebody asks the run to end: its goals are canceled and drained."""
 
     who: str
-    """SIGINT and the like, TIMEOUT (`--timeout`), SIGPIPE; of a served run CANCELED, HALTED, ..."""
+    """SIGINT and the like, TIMEOUT, SIGPIPE, INTERRUPTED (by a program); of a served run CANCELED,
+    HALTED, ..."""
     why: str
     """In words, to follow the status: ``interrupted by SIGINT``."""
     abandons: bool = False

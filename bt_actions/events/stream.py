@@ -26,6 +26,7 @@ from bt_actions.events.kinds import (
     NodesAdded,
     RoundBegan,
     RunBegan,
+    StopWanted,
     VariableWritten,
 )
 
@@ -86,6 +87,8 @@ class Stream:
         self._nodes: tuple[Event, ...] = ()
         """The RunBegan of the run that was told of last, and what was inserted since."""
         self._last: tuple[float, float, float] | None = None
+        self.stop_is_told = False
+        """Whether it was told who asks the run to end; the run takes it back at its end."""
 
     @property
     def is_read(self) -> bool:
@@ -129,6 +132,8 @@ class Stream:
             self._nodes = (event,)
         elif isinstance(event, NodesAdded):
             self._nodes += (event,)
+        elif isinstance(event, StopWanted):
+            self.stop_is_told = True
         for reader in self._readers:
             try:
                 reader.put(event)

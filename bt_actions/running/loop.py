@@ -21,7 +21,7 @@ from py_trees.trees import BehaviourTree
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.places import culprit_of, path_of, root_of
-from bt_actions.events import Observer, Paused
+from bt_actions.events import Observer, Paused, StopWanted
 from bt_actions.events.stream import Reader
 from bt_actions.messages.interfaces import TwoTypes
 from bt_actions.running.goals import RunGoals
@@ -178,6 +178,7 @@ class TickLoop:
             raise error
         self._error, self._status = error, Status.INVALID
 
+        self.teller.stream.stop_is_told = False
     def _rest(self) -> None:
         self.teller.rest()
         with self._traffic.host.lock:
@@ -303,7 +304,13 @@ class TickLoop:
     # Its end
 
     def _stop(self) -> Drain:
-        """Stop what still runs, and begin to drain."""
+        """Stop what still runs, and begin to drain; say why, where nobody has said it."""
+        stream = self.teller.stream
+        if self._status is Status.INVALID and self._error is None and not stream.stop_is_told:
+            if self._stop_wanted:
+                stream.add(StopWanted, "INTERRUPTED", "interrupted")
+            else:
+                stream.add(StopWanted, "TIMEOUT", f"timeout of {self._timeout:g} s expired")
         if self._visitor in self.tree.visitors:
             self.tree.visitors.remove(self._visitor)
         self._pause_wanted = False

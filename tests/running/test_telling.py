@@ -491,6 +491,44 @@ class TestWhatIsOdd:
         assert "goal {distance: 7.0}" in said[2]
 
 
+class TestStops:
+    """Who asked for the end is told before anything is stopped."""
+
+    def stops(self, runner: VirtualRunner) -> list[tuple[str, str]]:
+        assert [each.node.name for each in runner.state.stopped] == ["waits"]
+        return [(e.who, e.why) for e in runner.events if isinstance(e, StopWanted)]
+
+    @pytest.fixture
+    def runner(self) -> VirtualRunner:
+        return VirtualRunner(in_sequence(py_trees.behaviours.Running("waits"), name="root"))
+
+    def test_an_interrupt_is_told(self, runner: VirtualRunner) -> None:
+        runner.start()
+        runner.advance(1.0)
+        runner.interrupt()
+        runner.advance(1.0)
+        assert self.stops(runner) == [("INTERRUPTED", "interrupted")]
+
+    def test_a_timeout_is_told_in_each_run(self, runner: VirtualRunner) -> None:
+        for _ in range(2):
+            with pytest.raises(TimeoutError):
+                runner.run(timeout=2.5)
+        assert self.stops(runner) == [("TIMEOUT", "timeout of 2.5 s expired")] * 2
+
+    def test_one_that_somebody_has_told_is_not_told_again(self, runner: VirtualRunner) -> None:
+        runner.start()
+        runner.advance(1.0)
+        runner._loop.teller.stream.add(StopWanted, "SIGINT", "interrupted by SIGINT")
+        runner.interrupt()
+        runner.advance(1.0)
+        assert self.stops(runner) == [("SIGINT", "interrupted by SIGINT")]
+
+    def test_of_a_tree_that_fails_by_itself_there_is_none(self) -> None:
+        runner = VirtualRunner(py_trees.behaviours.Failure("fails"))
+        runner.run()
+        assert runner.state.stop is None
+
+
 class TestSecretsInWords:
     @pytest.mark.parametrize(
         "node",
