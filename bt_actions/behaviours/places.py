@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import FrameType
+
 from py_trees.behaviour import Behaviour
 
 
@@ -19,6 +21,15 @@ def path_of(behaviour: Behaviour) -> tuple[str, ...]:
         behaviour = behaviour.parent
         names.append(behaviour.name)
     return tuple(reversed(names))
+
+
+def innermost(frame: FrameType | None) -> Behaviour | None:
+    """Return the innermost behaviour whose method the frame, or one that called it, is of."""
+    while frame is not None:
+        if isinstance(behaviour := frame.f_locals.get("self"), Behaviour):
+            return behaviour
+        frame = frame.f_back
+    return None
 
 
 def culprit_of(error: BaseException) -> Behaviour | None:

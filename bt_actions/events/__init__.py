@@ -20,6 +20,7 @@ from bt_actions.events.kinds import (
     RunEnded,
     ServerSeen,
     StopWanted,
+    TickLasts,
     TreeFinished,
     VariableWritten,
 )
@@ -47,6 +48,7 @@ __all__ = [
     "RunEnded",
     "ServerSeen",
     "StopWanted",
+    "TickLasts",
     "TreeFinished",
     "Value",
     "VariableWritten",

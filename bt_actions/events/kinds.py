@@ -110,6 +110,20 @@ class NodeChanged(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class TickLasts(Event):
+    """The tick of a node itself has not returned for long; or, as `is_over` says, it now has.
+
+    All of the tree waits for it. Told from a thread of its own, once for each such tick.
+    """
+
+    node: int
+    """The innermost node in whose tick the tree is; its status may be told yet."""
+    seconds: float
+    """For how long, by now."""
+    is_over: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class GoalChanged(Event):
     """A goal has a new state, outcome or end; also after its leaf has left it."""
 

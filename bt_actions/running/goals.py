@@ -82,20 +82,19 @@ class RunGoals:
         self._run.sight = lambda server, in_sight: None
 
     def tell_feedback(self) -> None:
-        """Tell feedback that came too soon after the one before, when its time has come."""
-        if not self._late:
-            return
-        with self._lock:
-            now = self._steady()
-            for handle in [each for each in self._late if now - self._handles[each].at >= OFTEN]:
-                self._handles[handle].at = now
-                self._tell_feedback(handle, self._handles[handle])
+        """Tell feedback that came too soon after the one before; the caller holds the lock."""
+        now = self._steady()
+        for handle in [each for each in self._late if now - self._handles[each].at >= OFTEN]:
+            self._handles[handle].at = now
+            self._tell_feedback(handle, self._handles[handle])
 
     def forget(self) -> None:
         """Forget what is over."""
-        for done in [each for each in list(self._handles) if each.is_over]:
-            del self._handles[done]
-            self._late.pop(done, None)
+        if over := [each for each in list(self._handles) if each.is_over]:
+            with self._lock:
+                for each in over:
+                    del self._handles[each]
+                    self._late.pop(each, None)
 
     # Under the lock of the traffic, on any thread
 
@@ -121,7 +120,8 @@ class RunGoals:
             values["goal"] = HIDDEN if goal.is_secret else snapshot(goal.message)
         if goal.result is not None and not told.result:
             told.result = True
-            whole = {"fields": 100_000, "size": 10_000_000} if _is_whole(handle.owner) else {}
+            is_data = getattr(handle.owner, "tells_whole_result", False)  # for a caller
+            whole = {"fields": 100_000, "size": 10_000_000} if is_data else {}
             values["result"] = snapshot(goal.result, **whole)
         if goal.outcome is not None:
             self._tell_feedback(handle, told)
@@ -164,8 +164,3 @@ class _Told:
         """When feedback was told."""
         self.feedback: Any = None
         """The latest that was not told; a snapshot where a leaf's `on_feedback` may change it."""
-
-
-def _is_whole(leaf: Any) -> bool:
-    """Whether the result of a leaf is data for a caller, who gets all of it."""
-    return bool(getattr(leaf, "tells_whole_result", False))

@@ -96,7 +96,7 @@ class TickLoop:
             wake=wake,
             on_change=lambda: self._traffic.host.scheduler.add(self.watchdog),
         )
-        self.watchdog = Watchdog(self._traffic, self.goals)
+        self.watchdog = Watchdog(self._traffic, self.goals, self.teller)
         self._nodes = set[Behaviour]()  # of the tree, and set up
         self._pruned = weakref.WeakSet[Behaviour]()  # set up, and not in the tree any more
         self._with_children = dict[Behaviour, list[Behaviour]]()  # as they were set up
@@ -105,8 +105,6 @@ class TickLoop:
         self._timeout: float | None = None
         self._deadline = math.inf
         self._now = 0.0
-        self.ticks_since: float | None = None
-        """When the present tick began, on the steady clock; None between two ticks."""
         self._burst = 0
         self._status = Status.INVALID
         self._error: BaseException | None = None
@@ -178,9 +176,9 @@ class TickLoop:
             raise error
         self._error, self._status = error, Status.INVALID
 
-        self.teller.stream.stop_is_told = False
     def _rest(self) -> None:
         self.teller.rest()
+        self.teller.stream.stop_is_told = False
         with self._traffic.host.lock:
             self._stop_wanted = self._abandoned = self._pause_wanted = False
             self.goals.run_goes_on = False
@@ -247,18 +245,23 @@ class TickLoop:
 
     def _tick(self) -> bool:
         """Tick once, and tell whether that changed a status."""
-        self.ticks_since = self._now
+        dog = self.watchdog
+        dog.seen_at, dog.ticks_since = None, self._traffic.host.steady()
         try:
             self._guarded(lambda: tick_once(self.tree, self._visitor))
         except _Abandoned:
             pass
         finally:
-            self.ticks_since = None
+            dog.ticks_since = None
+            if dog.seen_at is not None:
+                dog.tick_returned()
             changed = self._visitor.finish()
             self._tell_observers()
-        return bool(changed)
+        return changed
 
     def _after_each(self) -> str:
+        if self.watchdog.seen_at is not None:
+            self.watchdog.tick_returned()
         if self.watchdog.ends_at < math.inf and self.watchdog.gives_up():
             raise _Abandoned
         return self._misbehaved()
@@ -387,7 +390,6 @@ class TickLoop:
     def _tell_observers(self) -> None:
         """Call each observer with what has happened; forget the goals that are over."""
         self.goals.forget()
-        self.goals.tell_feedback()
         steady = self._traffic.host.steady
         for reader, observer in list(self._observers.items()):
             for event in reader.take():

@@ -141,7 +141,7 @@ class TreeRunner:
 
     def ticks_since(self) -> float | None:
         """Return when the present tick began, on the steady clock; None between two ticks."""
-        return self._loop.ticks_since
+        return self._loop.watchdog.ticks_since
 
     @property
     def running(self) -> bool:
@@ -370,6 +370,7 @@ class TreeRunner:
                 raise RuntimeError("this runner has been shut down")
             self._runs_on = threading.get_ident()
             self._loop.begin(time.monotonic(), timeout)
+            self._loop.watchdog.see_ticks()
             while True:
                 try:
                     step = self._loop.step(time.monotonic())

@@ -1,7 +1,7 @@
-"""Cancels a run's goals where a tick does not return that should have been the last.
+"""Looks at a run from the alarm's thread: at a tick that lasts, and at one that was to be the last.
 
-While a behaviour does not return from it nobody else can stop the tree. Run beside the endpoints
-while any goal is wanted; has no thread of its own.
+While a behaviour does not return from its tick, nobody else can stop the tree, or tell of it. Run
+beside the endpoints; has no thread of its own.
 """
 
 from __future__ import annotations
@@ -12,12 +12,16 @@ import threading
 
 from py_trees.behaviour import Behaviour
 
-from bt_actions.behaviours.places import path_of
+from bt_actions.behaviours.places import innermost, path_of
+from bt_actions.events import TickLasts
 from bt_actions.running.goals import RunGoals
+from bt_actions.running.telling import TreeTeller
 from bt_actions.traffic.traffic import Traffic
 
 GRACE = 1.0
 """Seconds for a tick to return when the tree is to end."""
+LASTS = 1.0
+"""Seconds from which on the tick of a node is told of."""
 LOOK = 0.2
 """Seconds between two looks."""
 
@@ -25,18 +29,32 @@ LOOK = 0.2
 class Watchdog:
     """Guards one tree's runs, one after another."""
 
-    def __init__(self, traffic: Traffic, goals: RunGoals) -> None:
+    def __init__(self, traffic: Traffic, goals: RunGoals, teller: TreeTeller) -> None:
         self._traffic, self._host, self._goals = traffic, traffic.host, goals
+        self._teller = teller
         self.ends_at = math.inf
         """When the run is to end (seconds, steady clock); an interrupt makes it earlier."""
         self.ticks_on: int | None = None
         """The thread, until the last tick is over and what behaviours do when they are stopped."""
         self.gave_up = False
         """Whether it was so in this run: what the tree says since is of no account."""
+        self.ticks_since: float | None = None
+        """When the present tick of the tree began (seconds, steady clock); None between ticks."""
+        self.seen_at: float | None = None
+        """When the present tick of one node was first seen; None where it was not yet."""
+        self._lasting: Behaviour | None = None
+        """Whose tick was told to last."""
+        self._sees_ticks = False
 
     def begin(self, ends_at: float) -> None:
         """A run begins on this thread, which is to end at `ends_at` (seconds, steady clock)."""
         self.ticks_on, self.ends_at, self.gave_up = threading.get_ident(), ends_at, False
+
+    def see_ticks(self) -> None:
+        """Look at the ticks of the run, wanted goals or not."""
+        self._sees_ticks = True
+        with self._host.lock:
+            self._host.scheduler.add(self)
 
     def is_overdue(self, now: float) -> bool:
         """Whether the last tick should have been over for long; safe in a signal handler."""
@@ -48,29 +66,51 @@ class Watchdog:
             self._give_up()  # else it is for `run_due`, which bears with stalls
         return self.gave_up
 
-    def run_due(self, now: float) -> float:
-        """Cancel what is wanted where the last tick is overdue; return the seconds until a look.
+    def tick_returned(self) -> None:
+        """Take note that a node's tick is over that was seen."""
+        with self._host.lock:
+            self._tell(self._host.steady(), is_over=True)
+            self._lasting = self.seen_at = None
 
-        Is run no more, until it is scheduled again, where none is wanted.
+    def run_due(self, now: float) -> float:
+        """Tell what lasts, and feedback that came too soon; cancel what an overdue tick leaves.
+
+        Returns the seconds until a look. Is run no more where no goal is wanted and no tick is to
+        be seen, until it is scheduled again.
         """
         wanted = self._goals.wanted
-        if not wanted:
+        self._goals.tell_feedback()
+        self._see(now)
+        if not wanted and not (self._sees_ticks and self.ticks_on is not None):
             self._host.scheduler.remove(self)
-        elif self.is_overdue(now) and not self._host.stalls.answers_take(now):
+        elif wanted and self.is_overdue(now) and not self._host.stalls.answers_take(now):
             self._give_up()
             for handle in wanted:
                 self._traffic.interrupt(handle)
         return LOOK
 
+    def _see(self, now: float) -> None:
+        """Tell, once, whose tick has not returned for long."""
+        if self.ticks_since is None or self._lasting is not None:
+            return
+        if self.seen_at is None:
+            self.seen_at = now
+        elif now - self.seen_at >= LASTS:
+            self._lasting = self._innermost()
+            self._tell(now)
+
+    def _tell(self, now: float, *, is_over: bool = False) -> None:
+        number = self._teller.numbers.get(self._lasting)
+        if number is not None and self.seen_at is not None:
+            self._teller.stream.add(TickLasts, number, now - self.seen_at, is_over)
+
     def _give_up(self) -> None:
         """Warn, and name the innermost behaviour that the ticking thread is in; once."""
-        if self.gave_up:
-            return
-        self.gave_up, stuck = True, "the tree"
-        frame = sys._current_frames().get(self.ticks_on or 0)  # noqa: SLF001 - documented
-        while frame is not None:
-            if isinstance(behaviour := frame.f_locals.get("self"), Behaviour):
-                stuck = "/".join(path_of(behaviour))
-                break
-            frame = frame.f_back
-        self._host.log.warning(f"{stuck} does not return from its tick: canceling all goals")
+        if not self.gave_up:
+            self.gave_up, inside = True, self._innermost()
+            stuck = "the tree" if inside is None else "/".join(path_of(inside))
+            self._host.log.warning(f"{stuck} does not return from its tick: canceling all goals")
+
+    def _innermost(self) -> Behaviour | None:
+        """Return the innermost behaviour that the ticking thread is in."""
+        return innermost(sys._current_frames().get(self.ticks_on or 0))  # noqa: SLF001 - documented

@@ -29,6 +29,7 @@ from bt_actions.events.kinds import (
     RunEnded,
     ServerSeen,
     StopWanted,
+    TickLasts,
     TreeFinished,
     VariableWritten,
 )
@@ -123,6 +124,12 @@ class State:
     """What asked the run to end; the first counts."""
     stopped: list[Failure] = field(default_factory=list)
     """What ran when the run was asked to end."""
+    lasting: TickLasts | None = None
+    """The node in whose tick the tree is, where that lasts."""
+    leaves_ended: int = 0
+    """How often a leaf has ended."""
+    changes: int = 0
+    """How often a leaf has another status, a tick lasts or is over, the run is paused."""
     abandoned: bool = False
     """Whether goals that are being drained are waited for no longer."""
     paused: bool = False
@@ -147,6 +154,7 @@ class State:
         node = getattr(event, "node", None)
         if isinstance(node, int) and node not in self.nodes:
             return  # of a node that is gone, or of a run whose beginning this reader has not seen
+        self.changes += isinstance(event, TickLasts | Paused)
         match event:
             case NodeChanged():
                 self._node_changed(event)
@@ -163,6 +171,8 @@ class State:
                 self.variables[event.name] = event
             case ServerSeen():
                 self.servers[event.server] = event
+            case TickLasts():
+                self.lasting = None if event.is_over else event
             case NodesAdded():
                 self._add(event.nodes)
             case NodesRemoved():
@@ -220,6 +230,8 @@ class State:
             story.visits += event.status is not Status.INVALID
             self._deal_with(story.pending, story.node.parent)
             story.pending = []
+        self.changes += story.is_leaf
+        self.leaves_ended += story.is_leaf and event.status in OVER
         story.status, story.message, story.number = event.status, event.message, event.at.number
         story.since, story.warning, story.due_in = event.at, event.warning, event.due_in
         if event.warning and event.status is Status.SUCCESS:
@@ -373,6 +385,14 @@ class State:
             yield self.nodes[parent]
             parent = self.nodes[parent].node.parent
 
+    def below(self, node: int) -> Iterator[int]:
+        """Yield all nodes below one."""
+        waiting = list(self.nodes[node].children)
+        while waiting:
+            child = waiting.pop()
+            waiting += self.nodes[child].children
+            yield child
+
     def in_order(self) -> list[int]:
         """Return all nodes, each before its children."""
         waiting, found = [self.root], list[int]()
@@ -397,14 +417,26 @@ class State:
 
     @property
     def running(self) -> list[NodeStory]:
-        """The leaves that run, deepest first."""
+        """The leaves that run, deepest first; and a node in whose tick the tree is for long."""
+        inside = self.lasting.node if self.lasting is not None else 0
+        holders = {each.node.id for each in self.above(inside)} if inside in self.nodes else set()
         leaves = [
             each
             for each in self.nodes.values()
-            if each.status is Status.RUNNING
-            and not any(self.nodes[child].status is Status.RUNNING for child in each.children)
+            if each.node.id == inside
+            or (
+                each.status is Status.RUNNING
+                and each.node.id not in holders
+                and not any(self.nodes[child].status is Status.RUNNING for child in each.children)
+            )
         ]
         return sorted(leaves, key=lambda each: -sum(1 for _ in self.above(each.node.id)))
+
+    @property
+    def retries(self) -> bool:
+        """Whether an action that runs is not at its first attempt."""
+        tried = (self._actions.get(each.node.id) for each in self.running)
+        return any(action is not None and action.attempt > 1 for action in tried)
 
     @property
     def unaccounted(self) -> list[str]:

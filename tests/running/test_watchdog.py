@@ -9,9 +9,11 @@ import py_trees
 import pytest
 from py_trees.common import Status
 
-from bt_actions.running.watchdog import GRACE, LOOK, Watchdog
+from bt_actions import TreeError
+from bt_actions.events import TickLasts
+from bt_actions.running.watchdog import GRACE, LASTS, LOOK, Watchdog
 from tests.running.stepping import Stepped
-from tests.support.trees import in_sequence
+from tests.support.trees import in_sequence, together
 
 ENDS_AT = 9.0
 
@@ -23,7 +25,7 @@ class Guarded:
         self.goal = Mock()
         self.goals, self.traffic = Mock(wanted=[self.goal]), MagicMock()
         self.traffic.host.stalls.answers_take.return_value = 0.0
-        self.dog = Watchdog(self.traffic, self.goals)
+        self.dog = Watchdog(self.traffic, self.goals, MagicMock())
         self.dog.begin(ENDS_AT)
 
     def look_until(self, end: float, *, begin: float = ENDS_AT) -> bool:
@@ -85,6 +87,88 @@ def test_it_is_attended_to_while_a_goal_is_wanted(run: Guarded) -> None:
     run.goals.wanted = []
     run.dog.run_due(ENDS_AT)
     scheduler.remove.assert_called_once_with(run.dog)
+
+
+def test_it_is_attended_to_while_ticks_are_to_be_seen_until_the_run_ends(run: Guarded) -> None:
+    scheduler, run.goals.wanted = run.traffic.host.scheduler, []
+    run.dog.see_ticks()
+    scheduler.add.assert_called_once_with(run.dog)
+    run.dog.run_due(1.0)
+    scheduler.remove.assert_not_called()
+    run.dog.ticks_on = None
+    run.dog.run_due(2.0)
+    scheduler.remove.assert_called_once_with(run.dog)
+
+
+class Blocks(py_trees.behaviours.Running):
+    """Lets some time pass in each of its ticks, in which the watchdog looks."""
+
+    stepped: Stepped
+
+    def __init__(self, name: str, seconds: float) -> None:
+        super().__init__(name)
+        self.seconds = seconds
+
+    def update(self) -> Status:
+        end = self.stepped.now + self.seconds
+        while self.stepped.now < end:
+            self.stepped.loop.watchdog.run_due(self.stepped.now)
+            self.stepped.now += LOOK
+        return Status.RUNNING
+
+
+def ticks_that_last(*leaves: Blocks) -> list[tuple[str, float, bool]]:
+    """What is told of ticks in one tick of the leaves together."""
+    stepped = Stepped(together(*leaves))
+    for leaf in leaves:
+        leaf.stepped = stepped
+    stepped.begin()
+    stepped.step()
+    names = {number: leaf.name for leaf, number in stepped.loop.teller.numbers.items()}
+    told = [each for each in stepped.told if isinstance(each, TickLasts)]
+    return [(names[each.node], round(each.seconds), each.is_over) for each in told]
+
+
+def test_the_tick_of_a_node_that_lasts_is_told_once_and_when_it_is_over() -> None:
+    told = ticks_that_last(Blocks("quick", 0.4), Blocks("slow", 3.0), Blocks("slower", 4.0))
+    assert told == [
+        ("slow", LASTS, False),
+        ("slow", 3.0, True),
+        ("slower", LASTS, False),
+        ("slower", 4.0, True),
+    ]
+
+
+def test_many_quick_ticks_are_no_tick_that_lasts() -> None:
+    assert ticks_that_last(*(Blocks(str(number), 0.8) for number in range(5))) == []
+
+
+def test_a_tick_that_raises_is_over_too() -> None:
+    class Breaks(Blocks):
+        def update(self) -> Status:
+            super().update()
+            raise ValueError("broken")
+
+    breaks = Breaks("breaks", 2.0)
+    breaks.stepped = Stepped(breaks)
+    with pytest.raises(TreeError):
+        breaks.stepped.run()
+    told = [each.is_over for each in breaks.stepped.told if isinstance(each, TickLasts)]
+    assert told == [False, True]
+    assert breaks.stepped.loop.watchdog.ticks_since is None
+
+
+def test_when_the_present_tick_began_is_known_while_it_lasts() -> None:
+    class Looks(py_trees.behaviours.Success):
+        def update(self) -> Status:
+            seen.append(stepped.loop.watchdog.ticks_since)
+            return Status.SUCCESS
+
+    seen = list[object]()
+    stepped = Stepped(Looks("looks"))
+    stepped.now = 7.0
+    stepped.run()
+    assert (seen, stepped.loop.watchdog.ticks_since) == ([7.0], None)
 
 
 def test_where_no_goal_is_wanted_the_rest_of_the_tick_is_left_out_all_the_same() -> None:

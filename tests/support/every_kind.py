@@ -27,6 +27,7 @@ from bt_actions.events import (
     RunEnded,
     ServerSeen,
     StopWanted,
+    TickLasts,
     TreeFinished,
     VariableWritten,
 )
@@ -76,6 +77,8 @@ def every_kind(rounds: int = 1) -> list[Event]:
     tell(NodesAdded, (Node(4, 1, "New", "wait"),))
     tell(NodesRemoved, (4,))
     tell(ClockJumped, "wall", -3600.5)
+    tell(TickLasts, 2, 1.1)
+    tell(TickLasts, 2, 14.2, True)
     tell(Paused, True)
     tell(Paused, False)
     tell(EventsLost, 7)

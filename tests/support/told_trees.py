@@ -19,6 +19,7 @@ from bt_actions.events import (
     NodesRemoved,
     RoundBegan,
     RunBegan,
+    TickLasts,
     TreeFinished,
     Value,
 )
@@ -145,6 +146,9 @@ class Story:
 
     def feedback(self, leaf: FakeNode, value: Value, *, attempt: int = 1) -> FeedbackCame:
         return FeedbackCame(self._next(), leaf.id, f"{leaf.name}-1-{attempt}", value)
+
+    def lasts(self, node: FakeNode, seconds: float, *, is_over: bool = False) -> TickLasts:
+        return TickLasts(self._next(), node.id, seconds, is_over)
 
     def round(self, loop: FakeNode, number: int, item: Value = None) -> RoundBegan:
         return RoundBegan(self._next(), loop.id, number, None, item)

@@ -19,6 +19,7 @@ from bt_actions.events import (
     RoundBegan,
     RunBegan,
     StopWanted,
+    TickLasts,
     Value,
 )
 from bt_actions.events.kinds import FeedbackCame
@@ -30,6 +31,7 @@ from bt_actions.utilities.plain_text import as_json
 
 KINDS = {
     NodeChanged: "node",
+    TickLasts: "tick",
     RoundBegan: "round",
     GoalChanged: "goal",
     FeedbackCame: "feedback",
@@ -176,13 +178,8 @@ def plain(value: Value | Mapping[str, Value] | Status) -> Any:
 
 
 def _node(node: Node) -> dict[str, object]:
-    return {
-        "id": node.id,
-        "parent": node.parent,
-        "name": node.name,
-        "kind": node.kind,
-        "place": node.place or None,
-    }
+    told = {key: getattr(node, key) for key in ("id", "parent", "name", "kind")}
+    return told | {"place": node.place or None}
 
 
 def _is_utf8(stream: TextIO) -> bool:
