@@ -25,6 +25,8 @@ from bt_actions.events import Event, GoalChanged, RunBegan, TreeFinished
 from bt_actions.ros import spinning
 from bt_actions.running import threads
 from bt_actions.running.threads import StartedRun
+from bt_actions.story.state import State
+from bt_actions.story.why import why
 from tests.conftest import OUR_OWN
 from tests.support.processes import Host, Journal
 from tests.support.stories import changes_of
@@ -367,6 +369,25 @@ class Stuck(Behaviour):
 
 class TestStuckInATick:
     """A behaviour that does not return must not keep the goals of a tree alive that is to end."""
+
+    def test_a_reader_is_told_in_whose_tick_the_tree_is_though_it_wants_no_goal(
+        self, node: Any
+    ) -> None:
+        stuck, run = Stuck(lambda: True), State()
+
+        def told() -> list[str]:
+            for event in reader.take():
+                run.observe(event)
+            return why(run, time.monotonic())
+
+        with TreeRunner(in_sequence(stuck, name="Look"), node=node) as runner:
+            reader = runner.stream.reader()
+            runner.start()
+            until(lambda: [each for each in told() if each.startswith("Stuck: in its tick for 1.")])
+            stuck.may_return.set()
+            assert runner.wait(9.0) is Status.SUCCESS
+        told()
+        assert run.lasting is None
 
     def test_the_goals_are_canceled_all_the_same(
         self, journal: Journal, name: str, node: Any, capfd: Any

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from operator import is_not
 from typing import TYPE_CHECKING, Any
 
 from py_trees.behaviour import Behaviour
@@ -27,6 +28,7 @@ from bt_actions.goals.policy import Busy, End, Outcome, Retry, Timeouts
 from bt_actions.messages.conversion import MessageError, fill
 from bt_actions.messages.fields import fields_in_words
 from bt_actions.messages.interfaces import interface
+from bt_actions.story.doing import goal_doing
 from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.drain import drain
 from bt_actions.utilities.shorten import shorten
@@ -81,8 +83,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
     Raises ValueError for a policy, an expression or a place that makes no sense.
     """
 
-    __slots__ = ("_attempts", "_handle", "_left_behind", "_outcome", "_reading",
-                 "_shown_feedback")  # fmt: skip
+    __slots__ = ("_attempts", "_handle", "_left_behind", "_outcome", "_reading", "_shown")
 
     def __init__(
         self,
@@ -113,7 +114,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         self.expect = expect
         self.save = dict(save or {})
         self._reading = Reading(expect, self.save, self.retry.when, self.names)
-        self._shown_feedback = None, ""
+        self._shown: tuple[tuple[Any, Any, Any], str] = (None, None, None), ""
         self._handle: GoalHandle | None = None
         self._left_behind: list[GoalHandle] = []
         self._attempts = Attempts(self.retry, self._reading.when)
@@ -421,13 +422,13 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         return self._reading.read(result)
 
     def _in_words(self, handle: GoalHandle) -> str:
-        tries = f", attempt {self.attempt} of {self.retry.attempts}" if self.attempt > 1 else ""
-        feedback = handle.goal.feedback
-        if feedback is not self._shown_feedback[0]:
-            told = f": {fields_in_words(feedback)}" if feedback is not None else ""
-            self._shown_feedback = feedback, told
-        state = handle.goal.state.shown.lower().replace("_", " ")
-        return f"{state}{tries}{self._shown_feedback[1]}"
+        goal = handle.goal
+        news = goal, goal.state, goal.feedback
+        if any(map(is_not, news, self._shown[0])):  # not in each tick
+            does = goal_doing(goal.state.shown, goal.server, self.attempt, self.retry.attempts)
+            told = "" if goal.feedback is None else fields_in_words(goal.feedback)
+            self._shown = news, str(does._replace(told=told))
+        return self._shown[1]
 
     def _let_go(self) -> None:
         if self._backend is not None:

@@ -38,10 +38,7 @@ class Wait(Leaf):
     def do(self) -> Status:
         if self.status is not Status.RUNNING:  # the first tick of a visit
             self.give(parse_duration(self._duration()))
-        if (left := self.left()) <= 0.0:
-            return Status.SUCCESS
-        self.feedback_message = f"{left:.1f} s left"
-        return Status.RUNNING
+        return Status.SUCCESS if self.left() <= 0.0 else Status.RUNNING
 
 
 class WaitUntil(Limited):

@@ -115,6 +115,10 @@ class CallService(Connected[Service], Limited):
         """Return the seconds until the next deadline, try or look."""
         return self.left() if self._pausing or self._call is not None else LOOKS
 
+    def left_to_run(self) -> float | None:
+        is_last = self._call is not None and self.retry.attempts == 1
+        return super().left_to_run() if is_last else None  # else another time follows
+
     def _drop(self) -> None:
         """Take no interest in an answer any more."""
         if self._call is not None:

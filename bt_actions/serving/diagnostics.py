@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
@@ -12,6 +13,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.serving.catalog import State
 from bt_actions.serving.outcome import RunOutcome
+from bt_actions.story.state import State as RunState
+from bt_actions.story.why import waits
 
 PERIOD = 1.0
 """Seconds."""
@@ -27,8 +30,19 @@ class Standing(NamedTuple):
     paused: int = 0
     """Of those that run."""
     retrying: bool = False
+    doing: tuple[str, ...] = ()
+    """A line for each leaf that runs."""
     last: RunOutcome | None = None
     """How its last run ended."""
+
+    def beside(self, run: RunState, *, paused: bool) -> Standing:
+        """Return it with one more run."""
+        return self._replace(
+            running=self.running + 1,
+            paused=self.paused + paused,
+            retrying=self.retrying or run.retries,
+            doing=(*self.doing, *waits(run, time.monotonic())),
+        )
 
 
 def judge(standing: Standing, refuses: str) -> tuple[bytes, str]:
@@ -89,6 +103,7 @@ class Diagnostics:
             "state": standing.state.name,
             "running": str(standing.running),
             "paused": str(standing.paused),
+            "doing": "; ".join(standing.doing),
             "last_error_code": "" if standing.last is None else str(standing.last.code),
         }
         return DiagnosticStatus(

@@ -44,7 +44,8 @@ class Goal:
 
     def tell(self, now: float) -> None:
         """Tell its client how far it is; to be called every FASTEST seconds."""
-        changes = self.run.changes
+        with self.run.told() as state:
+            changes = state.changes
         if changes != self._told or now - self._told_at >= SLOWEST - FASTEST / 2:
             self._told, self._told_at = changes, now
             self.client.publish_feedback(feedback(self.run, begun=self.begun))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from bt_actions_interfaces.action import RunTree
-from bt_actions_interfaces.msg import ActionReport, Finding, TreeInfo, TreeInput
+from bt_actions_interfaces.msg import ActionReport, Finding, RunningLeaf, TreeInfo, TreeInput
 from builtin_interfaces.msg import Duration
 from unique_identifier_msgs.msg import UUID
 
@@ -16,7 +16,12 @@ from bt_actions.serving.requests import Said
 from bt_actions.serving.run import Run
 from bt_actions.serving.story import warnings_of
 from bt_actions.story.actions import ActionStory
+from bt_actions.story.doing import doing
+from bt_actions.story.state import NodeStory, State
 from bt_actions.utilities.plain_text import as_json
+
+SHOWN = 3
+"""Running leaves that are told of."""
 
 
 def result(outcome: RunOutcome) -> RunTree.Result:
@@ -32,12 +37,20 @@ def result(outcome: RunOutcome) -> RunTree.Result:
 
 def feedback(run: Run, *, begun: bool) -> RunTree.Feedback:
     """Return how far a run is."""
+    with run.told() as state:
+        leaves = [_leaf(state, each) for each in state.running[:SHOWN]]
+        ended = state.leaves_ended
     return RunTree.Feedback(
-        running=run.running(),
-        leaves_ended=run.leaves_ended,
-        paused=run.paused,
-        waiting=not begun,
+        running=leaves, leaves_ended=ended, paused=run.paused, waiting=not begun
     )
+
+
+def _leaf(state: State, story: NodeStory) -> RunningLeaf:
+    path, message = SEPARATOR.join(state.path(story.node.id)), str(doing(state, story))
+    if not state.acts(story.node.id):
+        return RunningLeaf(path=path, message=message)
+    action = state.action(story.node.id)
+    return RunningLeaf(path=path, message=message, attempt=action.attempt, attempts=action.of)
 
 
 def finding(said: Said) -> Finding:

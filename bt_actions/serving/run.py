@@ -5,27 +5,24 @@ The node and its executor are somebody else's. Nothing here knows who asked for 
 
 from __future__ import annotations
 
+import contextlib
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from bt_actions_interfaces.msg import RunningLeaf
 from py_trees.common import Status
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.document import Tree, tree_outputs
-from bt_actions.events import Event, NodeChanged, RunEnded, StopWanted
+from bt_actions.events import RunEnded, StopWanted
+from bt_actions.events.stream import Reader
 from bt_actions.messages.conversion import to_plain
 from bt_actions.recording.recorder import Recorder
 from bt_actions.ros.naming import server_name
 from bt_actions.running.runner import TreeRunner
-from bt_actions.serving.outcome import SEPARATOR, Ending, RunOutcome, outcome_of
-from bt_actions.story.state import OVER, NodeStory, State
-from bt_actions.story.words import doing_text
+from bt_actions.serving.outcome import Ending, RunOutcome, outcome_of
+from bt_actions.story.state import State
 from bt_actions.utilities.plain_text import as_json
-
-SHOWN = 3
-"""Running leaves that are told of."""
 
 
 class Run:
@@ -61,10 +58,8 @@ class Run:
         self.paused = False
         """No new goal is begun."""
         self.ending: Ending | None = None
-        self.leaves_ended = 0
         self._state = State()
-        self.changes = 0
-        """How often something has changed that is told of while it runs."""
+        self._events: Reader | None = None
         self._thread = threading.Thread(target=self._run, name=f"bt_actions-serve-{tree.name}")
         self._thread.daemon = True  # as that of TreeRunner.start: what it leaves is drained at exit
 
@@ -79,15 +74,17 @@ class Run:
         """
         with self._lock:
             self.ending = self.ending or ending
-            if self._runner is not None:
-                self._runner.stream.add(StopWanted, ending.name, ending.value[1], abandon)
-                self._runner.interrupt(abandon=abandon)
+            self._stop(ending, abandon=abandon)
+
+    def _stop(self, ending: Ending, *, abandon: bool = False) -> None:
+        if self._runner is not None:
+            self._runner.stream.add(StopWanted, ending.name, ending.value[1], abandon)
+            self._runner.interrupt(abandon=abandon)
 
     def pause(self, wanted: bool) -> None:
         """Begin no new goal, or begin goals again; goals that run go on."""
         with self._lock:
             self.paused = wanted
-            self.changes += 1
             if self._runner is not None:
                 (self._runner.pause if wanted else self._runner.resume)()
 
@@ -97,27 +94,13 @@ class Run:
             self._thread.join(timeout)
         return not self._thread.is_alive()
 
-    def running(self) -> list[RunningLeaf]:
-        """The leaves that run, deepest first; on any thread."""
+    @contextlib.contextmanager
+    def told(self) -> Iterator[State]:
+        """Give how it stands by now, also while a tick does not return; on any thread."""
         with self._lock:
-            return [self._leaf(each) for each in self._state.running[:SHOWN]]
-
-    def retrying(self) -> bool:
-        """Whether an action that runs is not at its first attempt; on any thread."""
-        with self._lock:
-            state = self._state
-            return any(
-                state.acts(each.node.id) and state.action(each.node.id).attempt > 1
-                for each in state.running
-            )
-
-    def _leaf(self, story: NodeStory) -> RunningLeaf:
-        path = SEPARATOR.join(self._state.path(story.node.id))
-        told = RunningLeaf(path=path, message=doing_text(story, self._state))
-        if self._state.acts(story.node.id):
-            action = self._state.action(story.node.id)
-            told.attempt, told.attempts = action.attempt, action.of
-        return told
+            for event in self._events.take() if self._events is not None else ():
+                self._state.observe(event)
+            yield self._state
 
     # On the run's thread
 
@@ -135,14 +118,13 @@ class Run:
         status, error = Status.INVALID, None
         runner = TreeRunner(root, node=self._node)
         runner.asked_by = self._asked_by
-        runner.observe(self._note)
         if self._recorder is not None:
             self._recorder.record(runner.stream, runner.ticks_since)
         try:
             with self._lock:
-                self._runner = runner
+                self._runner, self._events = runner, runner.stream.reader()
                 if self.ending is not None:
-                    runner.interrupt()
+                    self._stop(self.ending)
                 if self.paused:
                     runner.pause()
             status = runner.run()
@@ -160,20 +142,14 @@ class Run:
                 )
             except Exception as raised:  # noqa: BLE001 - a python: node may write anything
                 status, error = Status.INVALID, raised
-        outcome = outcome_of(
-            self._state,
-            succeeded=status is Status.SUCCESS,
-            ending=None if status is Status.FAILURE else self.ending,
-            error=error,
-            outputs=outputs,
-            unaccounted=[f"{each.name} on {each.server}" for each in runner.unaccounted],
-        )
+        with self.told() as state:
+            outcome = outcome_of(
+                state,
+                succeeded=status is Status.SUCCESS,
+                ending=None if status is Status.FAILURE else self.ending,
+                error=error,
+                outputs=outputs,
+                unaccounted=[f"{each.name} on {each.server}" for each in runner.unaccounted],
+            )
         runner.stream.add(RunEnded, outcome.code, "", outcome.why, outcome.unaccounted)
         return outcome
-
-    def _note(self, event: Event) -> None:
-        with self._lock:
-            self._state.observe(event)
-            if isinstance(event, NodeChanged) and self._state.nodes[event.node].is_leaf:
-                self.leaves_ended += event.status in OVER
-                self.changes += 1

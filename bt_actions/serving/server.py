@@ -229,10 +229,11 @@ class TreeServer:
             found = []
             for entry in entries:
                 runs = [goal.run for goal in goals if goal.tree == entry.name]
-                retrying = any(run.retrying() for run in runs)
-                last = self._last.get(entry.name)
-                paused = sum(run.paused for run in runs)
-                found.append(Standing(entry.name, entry.state, len(runs), paused, retrying, last))
+                standing = Standing(entry.name, entry.state, last=self._last.get(entry.name))
+                for run in runs:
+                    with run.told() as state:
+                        standing = standing.beside(state, paused=run.paused)
+                found.append(standing)
             return found, self._refuses or self.precedence.why
 
     # Requests; on the executor's threads

@@ -15,9 +15,9 @@ from py_trees.common import Status
 from bt_actions.events.kinds import Node, RoundBegan
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory, GoalStory
-from bt_actions.story.state import Failure, NodeStory, State
-from bt_actions.story.values import feedback_text, opened
-from bt_actions.story.waiting import due_of
+from bt_actions.story.doing import doing
+from bt_actions.story.state import Failure, State
+from bt_actions.story.values import opened
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import brief, fit, shorten
 
@@ -33,13 +33,6 @@ _BELOW = "has failed:"
 """Ends the line before these."""
 _FIRST = re.compile(rf"\A(.*)\n  (?:(.*{_BELOW})\n    )?")
 """The path of a cause; of a RunTree leaf, also what stands before the cause below."""
-_WAITS = {
-    "QUEUED": "waits for its turn on",
-    "WAITING_FOR_SERVER": "waits for the server",
-    "SENDING": "waits for the answer of",
-    "EXECUTING": "waits for the result of",
-    "CANCELING": "waits for the end at",
-}
 
 _USUAL_ENDS = {
     Outcome.SUCCEEDED: End.SUCCEEDED,
@@ -98,33 +91,14 @@ def why_text(state: State, now: float | None = None) -> str:
 
 
 def waits(state: State, now: float) -> list[str]:
-    """Return for each running leaf, the deepest first, what it waits for and until when."""
+    """Return for each running leaf, the deepest first, what it does, since and until when."""
     running = state.running
-    lines = [clean(_doing(state, story, now)) for story in running[:LINES]]
+    lines = [
+        clean(f"{state.called(each.node.id)}: {doing(state, each, now)}")
+        for each in running[:LINES]
+    ]
     more = len(running) - LINES
     return [*lines[:-1], f"and {more + 1} more"] if more > 0 else lines
-
-
-def _doing(state: State, story: NodeStory, now: float) -> str:
-    name = state.called(story.node.id)
-    since = max(0.0, now - story.since.steady) if story.since is not None else 0.0
-    if not state.acts(story.node.id):
-        its_time = "" if story.due_in is None else f"; its time is {story.due_in:g} s"
-        said = f": {story.message}" if story.message and not its_time else ""
-        return f"{name} runs for {since:.1f} s{its_time}{said}"
-    action = state.action(story.node.id)
-    if action.latest is None:
-        return f"{name} runs for {since:.1f} s"
-    due, since = due_of(action, now), max(0.0, now - action.latest.since.steady)
-    if due is not None and due.name == "backoff":
-        told = f"{action.outcome}: {action.reason}"
-        return f"{name} tries again in {due.left:.1f} s: {told}"
-    what = _WAITS.get(action.state, f"is {action.state.lower()} on")
-    until = f"; timeout.{due.name} at {due.limit:g} s" if due is not None else ""
-    feedback = feedback_text(action)
-    return f"{name} {what} {action.server} for {since:.1f} s{until}" + (
-        f"; feedback: {feedback}" if feedback else ""
-    )
 
 
 # After a failure

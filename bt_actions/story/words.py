@@ -13,9 +13,10 @@ from bt_actions.events.kinds import Moment, RunEnded
 from bt_actions.events.snapshot import Cut, Value
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
-from bt_actions.story.state import NodeStory, State
+from bt_actions.story.doing import goal_doing
+from bt_actions.story.state import State
 from bt_actions.story.table import table
-from bt_actions.story.values import constants_of, feedback_text, named
+from bt_actions.story.values import constants_of, named
 from bt_actions.story.why import outcome_text, why
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import MESSAGE, brief, fit, shorten
@@ -43,16 +44,26 @@ def verdict(status: Status, seconds: float | None) -> str:
 def last_words(state: State, width: int = MESSAGE) -> list[str]:
     """Return the table, the verdict, how long it took, and last what went wrong."""
     ended = state.ended or _NOTHING
-    lines = ["", *action_table(state, width)] if state.actions else []
-    outputs = [clean(f"{name}: {brief(value)}") for name, value in state.outputs.items()]
-    lines += ["", *outputs] if outputs else []
-    lines += ["", ended.world] if ended.world else []
     cause = f", {ended.cause}" if ended.cause else ""
     if ended.complaint and state.status is Status.SUCCESS:
         cause += ", but not as it should be"
-    lines += ["", f"{verdict(state.status, state.elapsed)}{cause}"]
-    wrong = troubles(state)
-    return [*lines, *(["", *wrong] if wrong else [])]
+    return blocks(
+        action_table(state, width),
+        outputs_lines(state.outputs),
+        [ended.world] if ended.world else [],
+        [f"{verdict(state.status, state.elapsed)}{cause}"],
+        troubles(state),
+    )
+
+
+def blocks(*blocks: list[str]) -> list[str]:
+    """Return what stands together, with an empty line before each block."""
+    return [line for block in blocks if block for line in ("", *block)]
+
+
+def outputs_lines(outputs: Mapping[str, object]) -> list[str]:
+    """Return a line for each output of a tree."""
+    return [clean(f"{name}: {brief(value)}") for name, value in outputs.items()]
 
 
 def action_table(state: State, width: int = MESSAGE) -> list[str]:
@@ -91,16 +102,9 @@ def error_text(state: State) -> str:
 
 def goal_text(action: ActionStory) -> str:
     """Say where the latest goal of an action stands."""
-    attempt = f" (attempt {action.attempt})" if action.attempt > 1 else ""
     if action.outcome is None:
-        words = {
-            "QUEUED": "waiting for its turn on",
-            "WAITING_FOR_SERVER": "waiting for the server",
-            "SENDING": "sending a goal to",
-            "EXECUTING": "executing on",
-            "CANCELING": "canceling on",
-        }
-        return f"{words.get(action.state, action.state.lower())} {action.server}{attempt}"
+        return str(goal_doing(action.state, action.server, action.attempt, action.of))
+    attempt = f" (attempt {action.attempt})" if action.attempt > 1 else ""
     text = outcome_text(action.outcome, action.end, action.in_doubt)
     if action.end is End.UNKNOWN:  # why, is told of the goal
         return f"{text}{' yet' if action.live else ''}{attempt}"
@@ -120,17 +124,6 @@ def stopping_text(state: State) -> str:
     return f"{state.stop.why}: {waiting}; {again}" if waiting else state.stop.why
 
 
-def doing_text(story: NodeStory, state: State) -> str:
-    """Say what a running leaf does: of an action its goal's state, the attempt and feedback."""
-    if not state.acts(story.node.id):
-        return story.message
-    action = state.action(story.node.id)
-    tries = f", attempt {action.attempt} of {action.of}" if action.attempt > 1 else ""
-    feedback = feedback_text(action)
-    said = action.state.lower().replace("_", " ")
-    return f"{said}{tries}{f': {feedback}' if feedback else ''}"
-
-
 def waiting_text(state: State) -> str:
     """Say for what a run waits whose tree has ended; "" where it is over."""
     actions = [action for action in state.actions if action.waited_for]
@@ -142,6 +135,8 @@ def waiting_text(state: State) -> str:
     if actions:
         what = "looking out for a server that went away, to cancel its goal if it is back"
         return f"{what}: {_where(state, actions)}"
+    if state.lasting is not None:
+        return f"waiting for the tick of {state.called(state.lasting.node)} to return"
     return ""
 
 

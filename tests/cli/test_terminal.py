@@ -108,8 +108,8 @@ def test_the_tree_is_drawn_live_and_leaves_the_report(
     terminal: Callable[..., Terminal], mark: str
 ) -> None:
     demo = terminal(*DEMO)
-    demo.until("▶ To the part  executing, attempt 1 of 3, ")
-    demo.until(" s left for feedback, current_pose")
+    demo.until("▶ To the part  executing, ")
+    demo.until(" s left (timeout.feedback): current_pose")
     drawn = [line for line in demo.screen.display if line.strip()]
     start = next(n for n, line in enumerate(drawn) if "Ctrl-C cancels" in line)
     assert len(drawn) - start <= ROWS - 1 - SCROLLS

@@ -17,6 +17,8 @@ from rich.console import Console
 from robot_control_interfaces.action import MoveRobot as Move
 
 from bt_actions import MoveRobot, Retry
+from bt_actions.behaviours.decorators import Deadline
+from bt_actions.behaviours.leaves import Wait
 from bt_actions.cli.driving.feed import Feed
 from bt_actions.cli.views.choosing import choose
 from bt_actions.cli.views.json_lines import JsonView
@@ -28,6 +30,7 @@ from bt_actions.events import Event, RunEnded, StopWanted
 from bt_actions.events.snapshot import snapshot
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.state import State
+from bt_actions.story.why import why
 from bt_actions.story.words import last_words
 from bt_actions.testing import ScriptedServer, VirtualNetwork, VirtualRunner
 from tests.support.told_trees import FakeAction, FakeNode, Story
@@ -123,7 +126,7 @@ def test_each_attempt_that_fails_says_once_what_came_when_it_came() -> None:
     assert first == f"{told}executing on /move_robot"
     assert verdict.startswith(f"{told}attempt 1 of 2: {unmet}; goal {{distance: 1.0}}; result {{")
     assert re.search(r"; again in 0.\d s$", verdict)
-    assert second == f"{told}executing on /move_robot (attempt 2)"
+    assert second == f"{told}executing on /move_robot, attempt 2 of 2"
     assert last.startswith(f"{told}attempt 2 of 2: {unmet}; goal {{distance: 1.0}}; result {{")
     assert more == ["FAILURE  together / Move: UNEXPECTED_RESULT (attempt 2 of 2)"]
 
@@ -267,7 +270,7 @@ def test_a_goal_that_waits_gets_a_line_when_it_waits_for_a_second(
         lines.feeding.frame(story.time + waited)
         assert len(lines.said) == (waited >= LASTING)
     assert lines.out.getvalue().splitlines() == [
-        f"    2.00 s  goal     Deliver / Work / Step 0: {words} move_robot, for 1 s"
+        f"    2.00 s  goal     Deliver / Work / Step 0: {words} move_robot for 1.0 s"
     ], "the time at which it had lasted, whenever that was drawn"
 
 
@@ -285,9 +288,10 @@ def test_what_lasted_has_its_line_before_the_event_that_ends_it_also_where_nothi
         drawn.feeding.frame(events[1].at.steady + tenth / 10)
     drawn.feed(*events[2:])
     assert drawn.out.getvalue() == stored.out.getvalue()
+    goal = "goal     Deliver / Work / Step 0:"
     assert stored.out.getvalue().splitlines() == [
-        "    1.50 s  goal     Deliver / Work / Step 0: waiting for its turn on move_robot, for 1 s",
-        "    6.60 s  goal     Deliver / Work / Step 0: executing on move_robot",
+        f"    1.50 s  {goal} waiting for its turn on move_robot for 1.0 s",
+        f"    6.60 s  {goal} executing on move_robot",
     ]
 
 
@@ -340,11 +344,14 @@ def test_json_is_one_object_a_line_and_the_last_one_is_the_result(
     events = story.succeed(leaves[0])
     events[3:3] = [story.feedback(leaves[0], {"pose": 1.0})]
     events[5:5] = [story.verdict(leaves[0], Outcome.SUCCEEDED)]
-    objects = objects_of(story, story.round(root, 0), *events, note="a note")
+    lasts = [story.lasts(root, 1.0), story.lasts(root, 2.0, is_over=True)]
+    objects = objects_of(story, story.round(root, 0), *lasts, *events, note="a note")
     kinds = [each["event"] for each in objects]
     assert kinds == [
         "started",
         "round",
+        "tick",
+        "tick",
         "node",
         "goal",
         "goal",
@@ -542,7 +549,8 @@ def test_it_shows_what_an_action_does_its_attempt_its_feedback_and_the_time_left
     feed(state, view, story.goal(leaf, "EXECUTING", attempt=2))
     feed(state, view, story.feedback(leaf, feedback, attempt=2))
     view.frame(story.time - story.step + 25.8)
-    doing = "executing, attempt 2 of 3, 4.2 s left for the result, current_pose 1.50, status MOVING"
+    left = "4.2 s left (timeout.result)"
+    doing = f"executing, attempt 2 of 3, {left}: current_pose 1.50, status MOVING"
     assert [line.strip() for line in screen.lines() if "2  ex" in line] == [f"▶ Step 2  {doing}"]
     view.close()
 
@@ -557,9 +565,58 @@ def test_between_two_attempts_it_shows_why_and_when_the_next_begins() -> None:
     feed(state, view, story.goal(leaf, "DONE", **failed))
     feed(state, view, story.verdict(leaf, Outcome.ABORTED, "a fault", again_in=2.0))
     view.frame(story.time + 0.5)
-    doing = "ABORTED: a fault, again in 1.5 s, attempt 2 of 3"
+    doing = "trying again in 1.5 s, attempt 2 of 3: ABORTED: a fault"
     assert [line.strip() for line in screen.lines() if "Step" in line] == [f"▶ Step  {doing}"]
     view.close()
+
+
+def test_it_counts_down_the_time_of_a_wait_and_of_what_holds_others() -> None:
+    screen = Screen(60)
+    both = in_sequence(Wait("Rest", lambda: 5.0), name="Both")
+    runner, state = VirtualRunner(Deadline("In time", both, lambda: 9.0)), State()
+    runner.start()
+    runner.advance(0.5)
+    view = LiveView(state, screen.console)
+    feed(state, view, *runner.events)
+    for now, drawn in ((0.5, ["8.5 s", "4.5 s"]), (3.0, ["6.0 s", "2.0 s"])):
+        view.frame(now)
+        shown = [line for line in screen.lines() if line.endswith(" left")]
+        assert [line.rpartition("  ")[2] for line in shown] == [f"{each} left" for each in drawn]
+    view.close()
+
+
+def test_a_tick_that_lasts_is_shown_with_its_node_and_how_long_it_has_lasted() -> None:
+    first, grasp = FakeNode("First", kind="check"), FakeNode("Grasp", kind="python")
+    root = FakeNode("Work", [first, FakeNode("Inner", [grasp])])
+    story, screen, state = Story(root), Screen(60), State()
+    events = [
+        story.began,
+        story.node(first, Status.SUCCESS),
+        story.node(root, Status.RUNNING),
+        story.lasts(grasp, 1.0),
+    ]
+    view, lines = LiveView(state, screen.console), Lines(*events)
+    feed(state, view, *events)
+    view.frame(story.time + 13.0)
+    assert "    ▶ Grasp  in its tick for 14 s" in screen.lines()
+    assert why(state, story.time + 13.0) == ["Grasp: in its tick for 14 s"]
+    lines.feed(story.lasts(grasp, 15.5, is_over=True))
+    assert lines.said[-2:] == [
+        "tick     Work / Inner / Grasp: in its tick for 1.0 s",
+        "tick     Work / Inner / Grasp: its tick has taken 15.5 s",
+    ]
+    state.observe(story.lasts(grasp, 15.5, is_over=True))
+    assert why(state, story.time) == ["Work: running for 1.5 s"]
+    view.close()
+
+
+def test_who_stops_a_run_reads_whose_tick_has_to_return_first() -> None:
+    grasp = FakeNode("Grasp", kind="python")
+    story = Story(FakeNode("Work", [grasp]))
+    lines = Lines(story.began, story.lasts(grasp, 1.0))
+    lines.feed(StopWanted(story._next(), "SIGINT", "interrupted by SIGINT"))
+    said = "interrupted by SIGINT: waiting for the tick of Grasp to return; Ctrl-C again leaves"
+    assert said in lines.out.getvalue()
 
 
 def moving(name: str, *, attempts: int = 1) -> tuple[FakeNode, Any]:
@@ -755,7 +812,7 @@ def test_choosing_what_to_show_costs_the_same_in_a_tree_of_100000_nodes() -> Non
     state = Story(work).told()
     nodes = state.in_order()
     position = {node: number for number, node in enumerate(nodes)}
-    shown, hidden = choose(state, nodes, position, [1, work.children[50_000].id], 8)
+    shown, hidden, _ = choose(state, nodes, position, [1, work.children[50_000].id], 8)
     assert [state.nodes[node].node.name for node in shown] == [
         "work",
         "50000",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import pytest
@@ -62,9 +63,11 @@ def test_a_paused_run_is_told_of_as_one_in_feedback_list_diagnostics_and_log(
     journal = serve()
     server = serve_trees()
     told: dict[bytes, str] = {}
+    doing = set[str]()
 
     def hear(message: DiagnosticArray) -> None:
         mine = [each for each in message.status if each.name.endswith(": move")]
+        doing.update(each.value for one in mine for each in one.values if each.key == "doing")
         told.update({each.level: each.message for each in mine if each.hardware_id == space})
 
     client.node.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
@@ -73,6 +76,8 @@ def test_a_paused_run_is_told_of_as_one_in_feedback_list_diagnostics_and_log(
     journal.wait_for("accepted")
     client.until(lambda: sent.feedback, "it runs")
     assert not any(each.paused for each in sent.feedback)
+    runs = re.compile(rf".+: executing on {space}/move for \d+.*")
+    client.until(lambda: any(map(runs.match, doing)), "the diagnostics say what runs")
     assert client.call(ControlTree, goal_id=ours, command=PAUSE).accepted
     client.until(lambda: sent.feedback[-1].paused, "it is in the feedback")
     client.until(lambda: told.get(DiagnosticStatus.WARN) == "paused", "it is in the diagnostics")

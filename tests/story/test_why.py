@@ -8,8 +8,11 @@ import pytest
 from py_trees.common import Status
 from robot_control_interfaces.action import MoveRobot as Move
 
-from bt_actions import MoveRobot, Timeouts, load_tree
+from bt_actions import MoveRobot, Retry, Timeouts, load_tree
+from bt_actions.behaviours.decorators import Deadline
+from bt_actions.behaviours.leaves import Wait
 from bt_actions.goals.policy import End, Outcome
+from bt_actions.story.doing import doing
 from bt_actions.story.state import State
 from bt_actions.story.why import why, why_text
 from bt_actions.testing import Script, ScriptedServer, Simulation, VirtualNetwork, VirtualRunner
@@ -108,11 +111,46 @@ def test_while_it_runs_each_leaf_says_what_it_waits_for_and_until_when() -> None
     runner = VirtualRunner(together(*leaves), network)
     runner.start()
     runner.advance(1.9)
-    feedback = "feedback: current_pose 0.00, status READY"
+    feedback = "current_pose 0.00, status READY"
     assert why(runner.state, runner.now) == [
-        f"left waits for the result of /left for 1.9 s; timeout.result at 8 s; {feedback}",
-        "right waits for the server /right for 1.9 s; timeout.server at 5 s",
+        f"left: executing on /left for 1.9 s, 6.1 s left (timeout.result): {feedback}",
+        "right: waiting for the server /right for 1.9 s, 3.1 s left (timeout.server)",
     ]
+
+
+def test_a_leaf_tells_the_time_that_ends_first_its_own_or_that_of_a_node_that_holds_it() -> None:
+    inner = Deadline("Not yet", Wait("Rest", lambda: 5.0), lambda: 9.0)
+    runner = VirtualRunner(Deadline("Home in time", inner, lambda: 4.0))
+    runner.start()
+    runner.advance(1.5)
+    told = ["Rest: running for 1.5 s, 2.5 s left (Home in time)"]
+    assert why(runner.state, runner.now) == told
+
+
+def test_between_two_attempts_a_leaf_tells_when_the_next_begins_and_why() -> None:
+    network = VirtualNetwork()
+    refusals = iter(["no"])
+    ScriptedServer(network, Move, "move", Script(9.0, refuse=lambda goal: next(refusals, None)))
+    leaf = MoveRobot("Go", 1.0, action_name="move", retry=Retry(3, backoff=2.0, jitter=0.0))
+    runner = VirtualRunner(leaf, network)
+    runner.start()
+    runner.advance(0.5)
+    assert re.fullmatch(
+        r"Go: trying again in 1.\d s, attempt 2 of 3: REJECTED: .*", *why(runner.state, runner.now)
+    )
+    runner.advance(2.5)
+    assert "executing on /move for" in (said := why(runner.state, runner.now)[0])
+    assert ", attempt 2 of 3" in said
+
+
+def test_who_ticks_reads_the_same_words_on_the_leaf() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, Move, "move", Script(duration=9.0))
+    runner = VirtualRunner(leaf := MoveRobot("Go", 1.0, action_name="move"), network)
+    runner.start()
+    runner.advance(1.0)
+    told = "executing on /move: current_pose 0.00, status READY"
+    assert (leaf.feedback_message, str(doing(runner.state, runner.state.nodes[1]))) == (told, told)
 
 
 def test_a_run_below_is_told_by_the_story_that_its_server_gives(

@@ -295,7 +295,11 @@ class TestFeedback:
         leaf = MoveRobot("m", 5.0)
         with world.runner(leaf) as runner:
             runner.start()
-            runner.until(lambda: leaf.feedback_message.startswith("executing: current_pose 0."))
+            runner.until(
+                lambda: leaf.feedback_message.startswith(
+                    f"executing on {leaf.server}: current_pose 0."
+                )
+            )
             runner.until(
                 lambda: f"{leaf.progress().feedback.current_pose:g}" in leaf.feedback_message
             )

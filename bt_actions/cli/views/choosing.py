@@ -11,50 +11,38 @@ from bt_actions.story.state import State
 
 def choose(
     state: State, nodes: list[int], position: dict[int, int], running: list[int], most: int
-) -> tuple[list[int], int]:
+) -> tuple[list[int], int, dict[int, int]]:
     """Return at most `most` lines' worth of nodes in tree order, and how many are left out.
+
+    And for each node that runs the lowest one above it, if not shown, where its branch leaves
+    another one.
 
     First what runs, then of what holds it that which tells running branches apart, then the rest
     of what holds it, then what comes next to it, then what is nearest in the tree. One line is
     kept for saying how many are left out. The cost does not grow with the tree.
     """
     if len(nodes) <= most:
-        return nodes, 0
-    room = most - 1
+        return nodes, 0, {}
+    chains = _branches(state, running, position)
+    forks = _fork_of(chains)
     chosen: set[int] = set()
-    chains = branches(state, running, position)
-
-    def take(node: int) -> None:
-        if len(chosen) < room and node in position:
+    for node in itertools.chain(
+        (chain[0] for chain in chains),
+        (forks[chain[0]] for chain in chains if chain[0] in forks),
+        (each for rank in itertools.zip_longest(*chains) for each in rank if each is not None),
+        (after for chain in chains for each in chain for after in _after(state, each)),
+        _around(nodes, position[chains[0][0]] if chains else 0, 8 * most),
+    ):
+        if len(chosen) >= most - 1:
+            break
+        if node in position:
             chosen.add(node)
-
-    for chain in chains:
-        take(chain[0])
-    forks = fork_of(chains)
-    for chain in chains:
-        if (fork := forks.get(chain[0])) is not None:
-            take(fork)
-    for rank in range(max((len(chain) for chain in chains), default=0)):
-        for chain in chains:
-            if rank < len(chain):
-                take(chain[rank])
-        if len(chosen) >= room:
-            break
-    for chain in chains:
-        for node in chain:
-            for sibling in _after(state, node):
-                if len(chosen) >= room:
-                    break
-                take(sibling)
-    for node in _around(nodes, position[chains[0][0]] if chains else 0, 8 * most):
-        if len(chosen) >= room:
-            break
-        take(node)
     shown = sorted(chosen, key=position.__getitem__)
-    return shown, len(nodes) - len(shown)
+    unseen = {tip: fork for tip, fork in forks.items() if fork not in chosen}
+    return shown, len(nodes) - len(shown), unseen
 
 
-def branches(state: State, running: list[int], position: dict[int, int]) -> list[list[int]]:
+def _branches(state: State, running: list[int], position: dict[int, int]) -> list[list[int]]:
     """Return what runs at the tips, in tree order, each with all that holds it, upwards."""
     active = set(running)
     tips = [node for node in running if active.isdisjoint(state.nodes[node].children)]
@@ -62,7 +50,7 @@ def branches(state: State, running: list[int], position: dict[int, int]) -> list
     return [[tip, *(above.node.id for above in state.above(tip))] for tip in tips]
 
 
-def fork_of(chains: list[list[int]]) -> dict[int, int]:
+def _fork_of(chains: list[list[int]]) -> dict[int, int]:
     """Return for each tip the lowest node above it where its branch leaves another one."""
     branches_at = Counter(node for chain in chains for node in chain)
     forks: dict[int, int] = {}
@@ -73,15 +61,6 @@ def fork_of(chains: list[list[int]]) -> dict[int, int]:
                     forks[chain[0]] = node
                 break
     return forks
-
-
-def below(state: State, node: int) -> Iterator[int]:
-    """Yield all nodes below one."""
-    waiting = list(state.nodes[node].children)
-    while waiting:
-        child = waiting.pop()
-        waiting += state.nodes[child].children
-        yield child
 
 
 def _around(nodes: list[int], at: int, most: int) -> Iterator[int]:

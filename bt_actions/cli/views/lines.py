@@ -6,7 +6,6 @@ from typing import TextIO
 
 from py_trees.common import Status
 
-from bt_actions.cli.views.choosing import below
 from bt_actions.cli.views.view import View
 from bt_actions.events import (
     AttemptEnded,
@@ -16,9 +15,11 @@ from bt_actions.events import (
     RoundBegan,
     RunBegan,
     StopWanted,
+    TickLasts,
 )
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory
+from bt_actions.story.doing import doing
 from bt_actions.story.state import OVER, NodeStory, State
 from bt_actions.story.why import attempt_text
 from bt_actions.story.words import goal_text, last_words, stopping_text, troubles
@@ -44,7 +45,7 @@ class LineView(View):
         self._nodes: dict[int, Status] = {}
         """The status that each node's line told."""
         self._goals: dict[int, object] = {}
-        self._passing: dict[int, tuple[float, str]] = {}
+        self._passing: dict[int, float] = {}
         """By leaf: since when its goal is in a state that is only told when it lasts."""
 
     def event(self, event: Event) -> None:
@@ -54,22 +55,27 @@ class LineView(View):
                 self._nodes.clear()
             case NodeChanged():
                 self._node(event)
+            case TickLasts():
+                said = str(doing(self._state, self._state.nodes[event.node], event.at.steady))
+                over = f"its tick has taken {event.seconds:.1f} s" if event.is_over else ""
+                self._line(event.at.steady, "tick", event.node, over or said)
             case GoalChanged():
                 self._goal(event)
             case AttemptEnded():
                 self._attempt(event)
             case RoundBegan():
-                for node in below(self._state, event.node):
+                for node in self._state.below(event.node):
                     self._nodes.pop(node, None)
             case StopWanted(abandons=False):
                 self._write(stopping_text(self._state))
 
     def due(self, now: float) -> None:
         """Write what has lasted long enough."""
-        for key, (since, text) in list(self._passing.items()):
+        for key, since in list(self._passing.items()):
             if now - since >= LASTING:
-                del self._passing[key]
-                self._goal_line(since + LASTING, key, f"{text}, for {LASTING:g} s")
+                at, action = self._passing.pop(key) + LASTING, self._state.action(key)
+                does = doing(self._state, self._state.nodes[key], at)
+                self._line(at, "goal", key, goal_text(action) if action.outcome else str(does))
 
     def _node(self, event: NodeChanged) -> None:
         story = self._state.nodes[event.node]
@@ -81,19 +87,19 @@ class LineView(View):
                 self._nodes.pop(event.node, None)
             return
         self._nodes[event.node] = event.status
-        said = self._news(story)
-        path = " / ".join(self._state.path(event.node))
-        self._line(event.at.steady, event.status.value, f"{path}{said and f': {said}'}")
+        self._line(event.at.steady, event.status.value, event.node, self._news(story, event))
 
-    def _news(self, story: NodeStory) -> str:
+    def _news(self, story: NodeStory, event: NodeChanged) -> str:
         """Return what a node says that no line has said, of its attempt or of a child."""
-        said = story.message
+        said = event.message
+        if event.status is Status.RUNNING:
+            return str(doing(self._state, story, event.at.steady)._replace(since=""))
         if said == Outcome.SUCCEEDED or said in [
             self._state.nodes[each].message for each in story.children
         ]:
             return ""
-        if story.status is Status.FAILURE and self._state.acts(story.node.id):
-            return said.removesuffix(f": {self._state.action(story.node.id).reason}")
+        if event.status is Status.FAILURE and self._state.acts(event.node):
+            return said.removesuffix(f": {self._state.action(event.node).reason}")
         return said
 
     def _goal(self, event: GoalChanged) -> None:
@@ -107,18 +113,19 @@ class LineView(View):
         if is_over and (event.state == DONE or event.end is not End.UNKNOWN):
             if action.goals[event.goal_id].verdict is not None:  # else that is to come
                 end = "end not known" if event.end is End.UNKNOWN else f"ended {event.end}"
-                self._goal_line(event.at.steady, key, f"{_which(action, event)}{end}")
+                self._line(event.at.steady, "goal", key, f"{_which(action, event)}{end}")
         elif not is_over and (self._verbose or event.state == "EXECUTING"):
-            self._goal_line(event.at.steady, key, goal_text(action))
+            self._line(event.at.steady, "goal", key, goal_text(action))
         else:
-            self._passing[key] = (event.at.steady, goal_text(action))
+            self._passing[key] = event.at.steady
 
     def _attempt(self, event: AttemptEnded) -> None:
         action = self._state.action(event.node)
         if event.outcome is not Outcome.SUCCEEDED:
             text = attempt_text(action, action.goals[event.goal_id])
             again = f"; again in {event.again_in:.1f} s" if event.again_in else ""
-            self._goal_line(event.at.steady, event.node, f"{_which(action, event)}{text}{again}")
+            said = f"{_which(action, event)}{text}{again}"
+            self._line(event.at.steady, "goal", event.node, said)
 
     def say(self, text: str) -> None:
         """Write `text` on a line of its own."""
@@ -129,11 +136,9 @@ class LineView(View):
         for line in last_words(self._state):
             self._write(line)
 
-    def _goal_line(self, at: float, key: int, text: str) -> None:
-        self._line(at, "goal", f"{' / '.join(self._state.path(key))}: {text}")
-
-    def _line(self, at: float, what: str, text: str) -> None:
-        self._write(f"{max(0.0, at - self._state.started):8.2f} s  {what:<8} {clean(text)}")
+    def _line(self, at: float, what: str, node: int, said: str) -> None:
+        text = clean(": ".join(filter(None, [" / ".join(self._state.path(node)), said])))
+        self._write(f"{max(0.0, at - self._state.started):8.2f} s  {what:<8} {text}")
 
     def _write(self, line: str) -> None:
         self._out.write(f"{fit(line)}\n")

@@ -13,14 +13,12 @@ from rich.live import Live
 from rich.text import Text
 
 from bt_actions.cli.streams.stderr import CaughtStderr
-from bt_actions.cli.views.choosing import below, branches, choose, fork_of
+from bt_actions.cli.views.choosing import choose
 from bt_actions.cli.views.view import View
-from bt_actions.events import Event, NodeChanged, RoundBegan, RunBegan, StopWanted
+from bt_actions.events import Event, NodeChanged, RoundBegan, RunBegan, StopWanted, TickLasts
 from bt_actions.events.kinds import NodesAdded
-from bt_actions.story.actions import ActionStory
+from bt_actions.story.doing import doing
 from bt_actions.story.state import OVER, NodeStory, State
-from bt_actions.story.values import feedback_text
-from bt_actions.story.waiting import due_of
 from bt_actions.story.words import goal_text, last_words, stopping_text
 from bt_actions.utilities.plain_text import clean
 
@@ -36,16 +34,6 @@ _GLYPHS = {
     Status.RUNNING: ("▶", ">"),
     Status.INVALID: ("·", "."),
 }
-
-_LEFT_FOR = {
-    "queue": "for its turn",
-    "server": "for the server",
-    "accept": "for the answer",
-    "result": "for the result",
-    "feedback": "for feedback",
-    "cancel": "for the cancel",
-}
-
 
 SCROLLS = 8
 """Lines above the drawing that stay for what scrolls by; of a low terminal, two thirds."""
@@ -66,7 +54,7 @@ class LiveView(View):
     def __init__(self, state: State, console: Console) -> None:
         self._state = state
         self._console = console
-        self._plain = not _can_write(console, "✓✗▶·…━")
+        self._plain = console.options.ascii_only
         self._nodes: list[int] = []
         self._position: dict[int, int] = {}
         self._leaves = 0
@@ -98,8 +86,10 @@ class LiveView(View):
                 self._index()
             case NodeChanged():
                 self._node_changed(event)
+            case TickLasts(is_over=False):
+                self._running.add(event.node)
             case RoundBegan():
-                for node in below(self._state, event.node):
+                for node in self._state.below(event.node):
                     self._last.pop(node, None)
             case StopWanted(abandons=False):
                 self.say(stopping_text(self._state))
@@ -177,14 +167,15 @@ class LiveView(View):
         most = max(1, height // 3, height - SCROLLS)
         lines = [self._progress(now)]
         running = [node for node in self._running if node in self._position]
-        shown, hidden = choose(self._state, self._nodes, self._position, running, max(0, most - 1))
-        marks = self._marks(shown, running)
+        tree = self._state, self._nodes, self._position
+        shown, hidden, forks = choose(*tree, running, max(0, most - 1))
         above: list[int] = []
         for node in shown:
             holders = {each.node.id for each in self._state.above(node)}
             while above and above[-1] not in holders:
                 above.pop()
-            lines.append(self._node(now, node, len(above), marks.get(node, "")))
+            mark = self._state.nodes[forks[node]].node.name if node in forks else ""
+            lines.append(self._node(now, node, len(above), mark))
             above.append(node)
         if hidden and most > 1:
             more = f"{self._dots} {hidden} more node{'s' if hidden > 1 else ''}"
@@ -193,12 +184,6 @@ class LiveView(View):
             line.no_wrap = True
             self._fit(line, self._width)
         return lines
-
-    def _marks(self, shown: list[int], running: list[int]) -> dict[int, str]:
-        """What tells a running node apart where there was no room for what holds it."""
-        forks = fork_of(branches(self._state, running, self._position))
-        names = self._state.nodes
-        return {tip: names[fork].node.name for tip, fork in forks.items() if fork not in shown}
 
     @property
     def _width(self) -> int:
@@ -216,7 +201,7 @@ class LiveView(View):
 
     def _node(self, now: float, node: int, depth: int, mark: str) -> Text:
         story = self._state.nodes[node]
-        status = story.status
+        status = Status.RUNNING if node in self._running else story.status
         narrow = self._width < NARROW
         text = Text((" " if narrow else "  ") * depth)
         text.append(f"{self._glyph(status)} ", style=_STYLES[status])
@@ -225,38 +210,20 @@ class LiveView(View):
             self._fit(said, max(12, self._width // (4 if mark else 2)))
             text.append_text(said)
             text.append(": " if name is mark else "")
-        if status is Status.RUNNING and story.is_leaf:
-            told = story.message
-            if self._state.acts(node):
-                told = self._doing(self._state.action(node), now)
-            text.append(f"  {clean(told)}" if told else "", style="cyan")
+        if status is Status.RUNNING:
+            does = doing(self._state, story, now)._replace(where="", since="")
+            if narrow and does.until:
+                does = does._replace(what="")
+            told = clean(str(does))
+            text.append(f"  {told}" if told else "", style="cyan")
         return text
-
-    def _doing(self, action: ActionStory, now: float) -> str:
-        """What an action is doing: its state, the attempt, its feedback, and the time left."""
-        due = due_of(action, now)
-        attempt, of = action.attempt, action.of
-        left = "" if due is None else _seconds(due.left)
-        if due is not None and due.name == "backoff":
-            again = f"attempt {attempt + 1} of {of}"
-            return ", ".join((goal_text(action), f"again in {left}", again))
-        attempts = f"attempt {attempt} of {of}" if of > 1 else ""
-        state = action.state.lower().replace("_", " ")
-        deadline = f"{left} left {_LEFT_FOR.get(due.name, '')}".rstrip() if due is not None else ""
-        if self._width < NARROW and due is not None:
-            state, deadline = "", f"{left} left"
-            attempts = f"{attempt} of {of}" if attempt > 1 else ""
-        parts = (state, attempts, deadline, feedback_text(action))
-        return ", ".join(part for part in parts if part)
 
     def _progress(self, now: float) -> Text:
         done, leaves = len(self._done), max(1, self._leaves)
         elapsed = f"  {self._state.since_began(now):.1f} s"
         keys = f"  Ctrl-C {'again leaves' if self._stopping else 'cancels'}"
         counts = (f" {done} of {self._leaves} leaves", f" {done}/{self._leaves}", "")
-        count = next(
-            (c for c in counts if len(c + elapsed + keys) <= self._width or not c), counts[-1]
-        )
+        count = next(c for c in counts if not c or len(c + elapsed + keys) <= self._width)
         width = max(0, min(BAR, self._width - len(count + elapsed + keys)))
         filled = width * min(done, leaves) // leaves
         full, empty = ("=", "-") if self._plain else ("━", "─")
@@ -270,16 +237,3 @@ class LiveView(View):
 
     def _glyph(self, status: Status) -> str:
         return _GLYPHS[status][self._plain]
-
-
-def _seconds(seconds: float) -> str:
-    seconds = max(0.0, seconds)
-    return f"{seconds:.0f} s" if seconds >= 10.0 else f"{seconds:.1f} s"
-
-
-def _can_write(console: Console, text: str) -> bool:
-    try:
-        text.encode(console.encoding)
-    except (UnicodeEncodeError, LookupError):
-        return False
-    return True

@@ -12,9 +12,9 @@ from bt_actions.events import Node, Value
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.table import table
 from bt_actions.story.values import opened
+from bt_actions.story.words import blocks, outputs_lines
 from bt_actions.utilities.names import told_apart
 from bt_actions.utilities.plain_text import clean
-from bt_actions.utilities.shorten import brief
 
 _NOT_NOW = ("BUSY", "INACTIVE")
 """Codes of rejections that say nothing against the tree or its inputs."""
@@ -53,11 +53,8 @@ class CallView(GoalView):
         actions = _actions(result)
         names = told_apart(each.path for each in actions)
         rows = table(actions, lambda each: names[each.path], 0.0)
-        lines = ["", *rows] if rows else []
-        outputs = [clean(f"{name}: {brief(value)}") for name, value in _outputs(result).items()]
-        lines += ["", *outputs] if outputs else []
         said = [clean(line) for line in str(result.get("error_msg", "")).splitlines()]
-        return [*lines, "", *said] if said else lines
+        return blocks(rows, outputs_lines(_outputs(result)), said)
 
 
 class CallJsonView(JsonView):
@@ -82,9 +79,7 @@ def _listed(value: Value) -> list[dict[str, Any]]:
 
 
 def _leaf_text(leaf: dict[str, Any]) -> str:
-    attempt = f" (attempt {leaf['attempt']} of {leaf['attempts']})" if leaf["attempt"] > 1 else ""
-    said = f": {leaf['message']}" if leaf["message"] else ""
-    return clean(f"{leaf['path']}{attempt}{said}")
+    return clean(": ".join(filter(None, (leaf["path"], leaf["message"]))))
 
 
 def _outputs(result: dict[str, Value]) -> dict[str, object]:

@@ -1,0 +1,115 @@
+"""What a running node does, since when, until when and by which rule: the one wording of it.
+
+A deadline that stands still, as its tree is paused or this process was stopped, is not known of
+here, nor a ROS clock that runs faster: it then falls due at another time than is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.state import NodeStory, State
+from bt_actions.story.values import feedback_text
+
+_STATES = {
+    "QUEUED": ("waiting for its turn", "on", "queue"),
+    "WAITING_FOR_SERVER": ("waiting for the server", "", "server"),
+    "SENDING": ("sending a goal", "to", "accept"),
+    "EXECUTING": ("executing", "on", "result"),
+    "CANCELING": ("canceling", "on", "cancel"),
+}
+"""The states of a goal in words, what leads from those to its server, and the field of Timeouts
+that bounds each."""
+
+
+class Doing(NamedTuple):
+    """What a node does, in parts; "" for a part that is not known, or needs a time."""
+
+    what: str = ""
+    """``executing``"""
+    where: str = ""
+    """``on /move_robot``"""
+    since: str = ""
+    """``for 1.9 s``"""
+    tries: str = ""
+    """``attempt 2 of 3``"""
+    until: str = ""
+    """``6.1 s left (timeout.result)``"""
+    told: str = ""
+    """Its feedback, or what the node says of itself."""
+
+    def __str__(self) -> str:
+        does = " ".join(part for part in (self.what, self.where, self.since) if part)
+        line = ", ".join(part for part in (does, self.tries, self.until) if part)
+        return ": ".join(part for part in (line, self.told) if part)
+
+
+def doing(state: State, story: NodeStory, now: float | None = None) -> Doing:
+    """Return what a running node does; times only for `now`, in seconds on the steady clock."""
+    number, lasting = story.node.id, state.lasting
+    if lasting is not None and lasting.node == number:
+        begun = lasting.at.steady - lasting.seconds
+        return Doing(f"in its tick {_for(begun, now)}".rstrip())
+    action = state.action(number) if state.acts(number) else None
+    until = ""
+    if now is not None and (dues := [*_deadlines(action, now), *_own_times(state, story, now)]):
+        left, rule = min(dues)
+        until = f"{_seconds(left)} left{rule and f' ({rule})'}"
+    goal = action.latest if action is not None else None
+    if action is None or goal is None:
+        since = _for(story.since.steady, now) if story.since is not None else ""
+        told = story.message if story.is_leaf else ""
+        return Doing(since=since and f"running {since}", until=until, told=told)
+    if goal.verdict is not None and (pause := goal.verdict.again_in) is not None:
+        left_of = "" if now is None else f" in {_seconds(goal.verdict.at.steady + pause - now)}"
+        tries, why = _tries(action.attempt + 1, action.of), f"{action.outcome}: {action.reason}"
+        return Doing(f"trying again{left_of}", tries=tries, until=until, told=why)
+    does = goal_doing(action.state, action.server, action.attempt, action.of)
+    since = _for(goal.since.steady, now)
+    return does._replace(since=since, until=until, told=feedback_text(action))
+
+
+def goal_doing(state: str, server: str, attempt: int, of: int) -> Doing:
+    """Return where a goal stands that has no outcome."""
+    what, to, _ = _STATES.get(state, (state.lower(), "on", ""))
+    return Doing(what, f"{to} {server}".lstrip(), tries=_tries(attempt, of))
+
+
+def _tries(attempt: int, of: int) -> str:
+    """Return which attempt it is; nothing of the first."""
+    return f"attempt {attempt} of {of}" if attempt > 1 else ""
+
+
+def _deadlines(action: ActionStory | None, now: float) -> Iterator[tuple[float, str]]:
+    """Yield the seconds that are left of each deadline of an action's goal, and its name."""
+    goal = action.latest if action is not None else None
+    timeouts = action.node.settings.get("timeouts") if action is not None else None
+    if goal is None or not isinstance(timeouts, dict):
+        return
+    _, _, phase = _STATES.get(goal.latest.state, ("", "", ""))
+    begun = {phase: goal.since}
+    if phase == "result":
+        begun["feedback"] = goal.since if goal.feedback is None else goal.feedback.at
+    for name, since in begun.items():
+        if isinstance(limit := timeouts.get(name), int | float):
+            yield max(0.0, since.steady + limit - now), f"timeout.{name}"
+
+
+def _own_times(state: State, story: NodeStory, now: float) -> Iterator[tuple[float, str]]:
+    """Yield the seconds that are left of a node's own time; of a leaf, also of what holds it."""
+    for each in (story, *(state.above(story.node.id) if story.is_leaf else ())):
+        if each.due_in is not None and each.since is not None:
+            left = each.since.steady + each.due_in - now
+            if left > 0.0:
+                yield left, "" if each is story else each.node.name
+
+
+def _for(since: float, now: float | None) -> str:
+    return "" if now is None else f"for {_seconds(now - since)}"
+
+
+def _seconds(seconds: float) -> str:
+    seconds = max(0.0, seconds)
+    return f"{seconds:.0f} s" if seconds >= 10.0 else f"{seconds:.1f} s"
