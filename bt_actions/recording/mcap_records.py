@@ -74,7 +74,8 @@ class NoMcap(ValueError):
 
 def records(file: BinaryIO) -> Iterator[Record]:
     """Yield what is whole of the records that tell something. Raises NoMcap, OSError."""
-    if file.read(len(MAGIC)) != MAGIC:
+    begin = file.read(len(MAGIC))
+    if not MAGIC.startswith(begin):
         raise NoMcap("no MCAP file")
     for kind, payload in _framed(file):
         yield from _opened(kind, payload)

@@ -1,0 +1,166 @@
+"""Where runs lie: which one is meant, and which are kept."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from bt_actions.recording.folders import (
+    FIRST,
+    NoRun,
+    Summary,
+    find,
+    folder_for,
+    held,
+    home,
+    prune,
+    read_summary,
+    recorded,
+    summary_of,
+    write_summary,
+)
+
+
+def made(
+    where: Path,
+    number: int,
+    *,
+    status: str = "SUCCESS",
+    stopped_by: str = "",
+    size: int = 100,
+    tree: str = "tree",
+    run_id: str = "",
+) -> Path:
+    """Make a run that began at second `number`."""
+    run_id = run_id or f"{number:032x}"[::-1]
+    folder = folder_for(run_id, tree, 1.8e9 + number, where)
+    first = folder / FIRST
+    first.write_bytes(bytes(size))
+    write_summary(
+        first, Summary(run_id, tree, 1.8e9 + number, status=status, stopped_by=stopped_by)
+    )
+    return first
+
+
+def numbers(where: Path) -> list[int]:
+    """Which runs are left."""
+    return sorted(round(run.summary.began - 1.8e9) for run in recorded(where))
+
+
+def test_runs_lie_in_the_state_directory_of_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", "/somewhere")
+    assert home() == Path("/somewhere/bt_actions/runs")
+    monkeypatch.delenv("XDG_STATE_HOME")
+    monkeypatch.setenv("HOME", "/home/me")
+    assert home() == Path("/home/me/.local/state/bt_actions/runs")
+
+
+def test_the_last_of_each_kind_are_kept(tmp_path: Path) -> None:
+    for number in range(6):
+        made(tmp_path, number)
+        made(tmp_path, 100 + number, status="FAILURE")
+        made(tmp_path, 200 + number, status="")
+    gone = prune(tmp_path, succeeded=2, failed=8)
+    assert numbers(tmp_path) == [4, 5, 104, 105, *range(200, 206)]
+    assert len(gone) == 8
+
+
+def test_a_run_that_somebody_stopped_counts_with_those_that_succeeded(tmp_path: Path) -> None:
+    for number, who in enumerate(["SIGINT", "CANCELED", "REPLACED", "HALTED"]):
+        made(tmp_path, number, status="INVALID", stopped_by=who)
+    made(tmp_path, 10, status="INVALID", stopped_by="TIMEOUT")
+    prune(tmp_path, succeeded=1, failed=1)
+    assert numbers(tmp_path) == [3, 10]
+
+
+def test_all_together_are_bounded_in_bytes(tmp_path: Path) -> None:
+    for number in range(5):
+        made(tmp_path, number, size=1000)
+    prune(tmp_path, size=3500)
+    assert numbers(tmp_path) == [2, 3, 4]
+
+
+def test_what_is_written_or_followed_is_never_removed(tmp_path: Path) -> None:
+    first = made(tmp_path, 1)
+    made(tmp_path, 2)
+    with held(first.parent) as is_ours:
+        assert is_ours
+        prune(tmp_path, succeeded=0)
+        assert numbers(tmp_path) == [1]
+    prune(tmp_path, succeeded=0)
+    assert numbers(tmp_path) == []
+
+
+def test_what_lies_there_and_is_no_run_stays(tmp_path: Path) -> None:
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "mine.txt").write_text("keep this")
+    (tmp_path / "link").symlink_to(tmp_path / "notes")
+    prune(tmp_path, succeeded=0, failed=0)
+    assert (tmp_path / "notes" / "mine.txt").exists()
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"{", b"[]", b'{"began": "soon"}', b"\xff" * 99, b"[" * 9999]
+)
+def test_a_summary_that_is_none_costs_what_it_says(tmp_path: Path, data: bytes) -> None:
+    first = made(tmp_path, 1)
+    summary_of(first).write_bytes(data)
+    assert read_summary(first) is None
+    [run] = recorded(tmp_path)
+    assert (run.summary.tree, run.summary.failed) == ("tree", True)
+
+
+def test_a_summary_shows_nothing_that_a_terminal_obeys(tmp_path: Path) -> None:
+    first = made(tmp_path, 1, tree="a")
+    write_summary(first, Summary("00", "\x1b[31mred\n", 1.0, cause="\x07\u202e"))
+    summary = read_summary(first)
+    assert summary is not None
+    assert (summary.tree, summary.cause.strip()) == (" [31mred ", "")
+
+
+class TestFind:
+    def test_without_a_text_the_newest_is_meant(self, tmp_path: Path) -> None:
+        made(tmp_path, 1)
+        newest = made(tmp_path, 2)
+        assert find("", tmp_path) == newest
+
+    def test_the_first_letters_of_an_id(self, tmp_path: Path) -> None:
+        one = made(tmp_path, 1, run_id="abcd" * 8)
+        made(tmp_path, 2, run_id="abce" * 8)
+        assert find("abcd", tmp_path) == one
+        with pytest.raises(NoRun, match="abc begins 2 ids"):
+            find("abc", tmp_path)
+
+    def test_a_tree_means_its_newest_run(self, tmp_path: Path) -> None:
+        made(tmp_path, 1, tree="patrol")
+        newest = made(tmp_path, 2, tree="patrol")
+        made(tmp_path, 3, tree="other")
+        assert find("patrol", tmp_path) == newest
+
+    def test_a_path_is_a_file_or_a_folder(self, tmp_path: Path) -> None:
+        first = made(tmp_path, 1)
+        assert find(str(first)) == first
+        assert find(str(first.parent)) == first
+        (tmp_path / "bag").mkdir()
+        (tmp_path / "bag" / "bag_0.mcap").touch()
+        assert find(str(tmp_path / "bag")) == tmp_path / "bag" / "bag_0.mcap"
+
+    def test_what_there_is_not_is_said_with_what_is_near(self, tmp_path: Path) -> None:
+        with pytest.raises(NoRun, match="no run is recorded yet"):
+            find("", tmp_path)
+        made(tmp_path, 1, tree="patrol")
+        with pytest.raises(NoRun, match="did you mean 'patrol'"):
+            find("patrool", tmp_path)
+        with pytest.raises(NoRun, match="is no recording"):
+            find(f"{tmp_path}/none")
+
+
+def test_the_folder_of_a_run_stays_below_the_others_whatever_its_tree_is_called(
+    tmp_path: Path,
+) -> None:
+    for name in ("../../etc", "/", "a" * 500, "", "\x00\n", "ä/b"):
+        folder = folder_for(os.urandom(16).hex(), name, 1.8e9, tmp_path)
+        assert folder.parent == tmp_path
+        assert folder.is_dir()

@@ -1,0 +1,246 @@
+"""The recorder's thread: what it writes while a run goes on, and what a kill leaves."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from py_trees.common import Status
+
+from bt_actions.events import (
+    NodeChanged,
+    RunBegan,
+    RunEnded,
+    StopWanted,
+    TreeFinished,
+    VariableWritten,
+)
+from bt_actions.events.stream import Stream
+from bt_actions.recording.finishing import is_finished
+from bt_actions.recording.folders import is_held, read_summary, recorded
+from bt_actions.recording.reading import Recording
+from bt_actions.recording.recorder import BEAT, Recorder, Wish
+from tests.support.every_kind import NODES, RUN_ID
+from tests.support.waiting import until
+
+ROOT = Path(__file__).parents[2]
+KILLS = 100 if os.environ.get("BT_THOROUGH") else 20
+
+
+class Clock:
+    """Real time, and a wall clock that can be set."""
+
+    def __init__(self) -> None:
+        self.set_by = 0.0
+
+    def __call__(self) -> tuple[float, float, float]:
+        return time.monotonic(), time.time() + self.set_by, 1.0
+
+
+def begin(stream: Stream, run_id: str = RUN_ID, tree: str = "tree") -> None:
+    stream.add(RunBegan, run_id, tree, NODES, {}, {}, {})
+
+
+def end(stream: Stream, status: Status = Status.SUCCESS, code: int = 0) -> None:
+    stream.add(NodeChanged, 1, status, "as it is")
+    stream.add(TreeFinished, status)
+    stream.add(RunEnded, code)
+
+
+@pytest.fixture
+def said() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def recorder(tmp_path: Path, said: list[str]) -> Iterator[Recorder]:
+    made = Recorder(Wish(where=tmp_path), said.append)
+    yield made
+    made.close()
+
+
+def test_a_run_is_in_its_folder_from_its_first_event_on(recorder: Recorder, tmp_path: Path) -> None:
+    stream = Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    until(lambda: len(recorded(tmp_path)) == 1 and read_summary(recorded(tmp_path)[0].first))
+    [run] = recorded(tmp_path)
+    assert run.is_held
+    assert run.first.parent.stat().st_mode & 0o777 == 0o700
+    assert (run.summary.tree, run.summary.status, run.summary.failed) == ("tree", "", True)
+
+
+def test_the_end_of_a_run_closes_and_finishes_its_file(recorder: Recorder, tmp_path: Path) -> None:
+    stream = Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    end(stream, Status.FAILURE, 1)
+    until(lambda: recorded(tmp_path) and is_finished(recorded(tmp_path)[0].first))
+    [run] = recorded(tmp_path)
+    assert not is_held(run.first.parent)
+    assert not stream.is_read
+    summary = run.summary
+    assert (summary.status, summary.exit_code, summary.failed) == ("FAILURE", 1, True)
+    assert "as it is" in summary.cause
+
+
+def test_what_was_closed_in_the_middle_of_a_run_can_be_read(tmp_path: Path) -> None:
+    recorder, stream = Recorder(Wish(where=tmp_path), print), Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    stream.add(VariableWritten, "x", 1, None)
+    recorder.close()
+    [run] = recorded(tmp_path)
+    assert Recording(run.first).state().variables["x"].value == 1
+    assert (run.summary.status, run.summary.failed) == ("", True)
+
+
+def test_two_runs_at_once_have_a_folder_each(recorder: Recorder, tmp_path: Path) -> None:
+    one, other = Stream(Clock()), Stream(Clock())
+    for stream, run_id in ((one, "aa" * 16), (other, "bb" * 16)):
+        recorder.record(stream, lambda: None)
+        begin(stream, run_id)
+    one.add(VariableWritten, "x", "one", None)
+    other.add(VariableWritten, "x", "other", None)
+    end(one)
+    end(other)
+    recorder.close()
+    runs = {run.summary.run_id[:2]: Recording(run.first).state() for run in recorded(tmp_path)}
+    assert runs["aa"].variables["x"].value == "one"
+    assert runs["bb"].variables["x"].value == "other"
+
+
+def test_the_process_tells_each_second_that_it_lives_and_how_long_its_tick_lasts(
+    recorder: Recorder, tmp_path: Path
+) -> None:
+    stream, began = Stream(Clock()), time.monotonic()
+    recorder.record(stream, lambda: began)  # a tick that does not return
+    begin(stream)
+    first = until(lambda: recorded(tmp_path) and recorded(tmp_path)[0].first)
+
+    def beats() -> Recording:
+        recording = Recording(first)
+        list(recording.items())
+        return recording
+
+    until(lambda: beats().tick > BEAT, 20.0)
+    assert beats().last_beat == pytest.approx(time.time(), abs=10 * BEAT)
+
+
+def test_the_log_s_time_never_goes_back_though_the_clock_does(
+    recorder: Recorder, tmp_path: Path
+) -> None:
+    clock = Clock()
+    stream = Stream(clock)
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    clock.set_by = -3600.0
+    stream.add(VariableWritten, "x", 1, None)
+    end(stream)
+    recorder.close()
+    from bt_actions.recording.mcap_records import Message, records
+
+    [run] = recorded(tmp_path)
+    with run.first.open("rb") as file:
+        found = [each for each in records(file) if isinstance(each, Message)]
+    times = [each.log_time for each in found]
+    assert times == sorted(times)
+    assert found[0].publish_time - found[-1].publish_time > 3590 * 10**9
+
+
+def test_a_folder_that_cannot_be_made_is_said_once(tmp_path: Path, said: list[str]) -> None:
+    (tmp_path / "file").write_text("in the way")
+    recorder, stream = Recorder(Wish(where=tmp_path / "file"), said.append), Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    end(stream)
+    recorder.close()
+    assert len(said) == 1
+    assert "not recorded" in said[0]
+    assert not stream.is_read
+
+
+def test_a_run_that_somebody_stopped_has_not_failed(recorder: Recorder, tmp_path: Path) -> None:
+    stream = Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    stream.add(StopWanted, "CANCELED", "a client canceled it")
+    stream.add(TreeFinished, Status.INVALID)
+    stream.add(RunEnded, 20002)
+    recorder.close()
+    [run] = recorded(tmp_path)
+    assert (run.summary.stopped_by, run.summary.failed) == ("CANCELED", False)
+
+
+def test_nobody_who_tells_an_event_waits_for_the_disk(
+    recorder: Recorder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from bt_actions.recording import writing
+
+    goes_on = threading.Event()
+    write = os.write
+
+    def slow(descriptor: int, data: bytes) -> int:
+        goes_on.wait(30.0)
+        return write(descriptor, data)
+
+    monkeypatch.setattr(writing.os, "write", slow)
+    stream = Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    for number in range(1000):
+        stream.add(VariableWritten, "x", number, None)
+    goes_on.set()  # not one of them has waited
+    end(stream)
+    recorder.close()
+    assert Recording(recorded(tmp_path)[0].first).state().variables["x"].value == 999
+
+
+@pytest.mark.slow
+def test_a_kill_at_any_moment_loses_a_second_at_most(tmp_path: Path) -> None:
+    """Twenty kills, or a hundred: ten processes at a time."""
+    chance = random.Random(9)
+    for _ in range(KILLS // 10):
+        with contextlib.ExitStack() as stack:
+            processes = []
+            for _ in range(10):
+                folder = tmp_path / str(chance.random())
+                command = [sys.executable, "-m", "tests.support.recorded_process"]
+                process = stack.enter_context(
+                    subprocess.Popen(
+                        [*command, str(folder), "100"],
+                        cwd=ROOT,
+                        stdout=subprocess.PIPE,
+                        text=True,
+                    )
+                )
+                stack.callback(process.kill)
+                processes.append((folder, process))
+            for _, process in processes:
+                assert process.stdout is not None
+                process.stdout.readline()  # it has begun
+            for _, process in processes:
+                time.sleep(chance.uniform(0.0, 0.3))
+                process.kill()
+            for folder, process in processes:
+                assert process.stdout is not None
+                told = [line.split() for line in process.stdout.read().splitlines()]
+                whole = [(int(each[0]), float(each[1])) for each in told if len(each) == 2]
+                if not whole:
+                    continue
+                last, ended = whole[-1]
+                runs = recorded(folder)
+                kept = 0
+                if runs:
+                    variables = Recording(runs[0].first).state().variables
+                    kept = int(variables["x"].value) if "x" in variables else 0  # type: ignore[arg-type]
+                lost = [at for number, at in whole if number > kept]
+                assert not lost or ended - lost[0] < 1.0, (kept, last)
