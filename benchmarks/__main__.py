@@ -23,6 +23,7 @@ from benchmarks import (
     importing,
     loading,
     many_leaves,
+    recording,
     run_tree,
     saving,
     ticking,
@@ -43,6 +44,8 @@ FAMILIES = [
     importing.FAMILY,
     saving.FAMILY,
     run_tree.FAMILY,
+    recording.CHAINS,
+    recording.TICKED,
 ]
 GATED = {"1", "2", "3", "4", "5", "8", "14"}
 SLACK = 1.25

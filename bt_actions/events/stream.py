@@ -145,7 +145,10 @@ class Stream:
         last, self._last = self._last, now
         if last is None:
             return []
-        steady, wall, ros = (each - before for each, before in zip(now, last, strict=True))
-        is_set = abs(wall - steady) > JUMP + SLEW * steady
-        jumps = [("wall", wall - steady)] if is_set else []
-        return [*jumps, ("ros", ros)] if ros < 0.0 else jumps
+        steady, wall, ros = now[0] - last[0], now[1] - last[1], now[2] - last[2]
+        jumps = []
+        if abs(wall - steady) > JUMP + SLEW * steady:
+            jumps.append(("wall", wall - steady))
+        if ros < 0.0:
+            jumps.append(("ros", ros))
+        return jumps

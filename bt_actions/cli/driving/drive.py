@@ -31,6 +31,8 @@ from bt_actions.events.stream import Stream
 from bt_actions.running.telling import where_raised
 from bt_actions.story.state import State
 
+GATHER = 0.02
+"""Seconds for which events gather before they are taken: each time takes Python's lock."""
 FRAME = 0.1
 """Seconds between two drawings where nothing happens."""
 PATIENCE_WHEN_LEFT = 1.0
@@ -119,6 +121,8 @@ class Drive:
             received, ready = self._signals.wait(
                 wait, readable=self._feed.view.fileno, writable=self._watched
             )
+            if not (received or self._finished.is_set()):
+                time.sleep(GATHER)
             self._take_events()  # what happened before the signal
             for signal in received:
                 self._signalled(signal)
