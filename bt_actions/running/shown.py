@@ -29,7 +29,6 @@ class ShownRun:
     def __init__(self, runner: TreeRunner, root: Behaviour) -> None:
         self._runner = runner
         self._state = State()  # of its own: the views' is read on the main thread
-        self._begun = self._closed = False
         self._once = threading.Lock()
         for name, (each, value) in given_inputs(root).items():
             if each.secret:  # which anybody could read, were it a parameter
@@ -49,17 +48,14 @@ class ShownRun:
     def _observe(self, event: Event) -> None:
         self._state.observe(event)
         if isinstance(event, RunBegan):
-            self._begun = True
             file = event.nodes[0].place.rsplit(":", 2)[0]
             self._rosout.say("info", f"{event.tree} {begins_text(file, event.inputs)}")
 
     def close(self, *, left: bool = False, error: BaseException | None = None) -> None:
         """Say how the run has ended; `left`: without waiting for its goals. Once is enough."""
-        with self._once:
-            if self._closed:
-                return
-            self._closed = True
-        if not self._begun:
+        if not self._once.acquire(blocking=False):
+            return
+        if self._state.began is None:
             self._rosout.close()
             return
         state, name = self._state, self._state.tree

@@ -94,7 +94,7 @@ def test_a_line_for_each_change_of_a_node_one_for_a_goal_under_way_and_one_for_i
 ) -> None:
     lines = Lines(story.began, story.node(root, Status.RUNNING), *story.succeed(leaves[0]))
     lines.feed(story.node(leaves[1], Status.RUNNING))
-    for state in ("QUEUED", "WAITING_FOR_SERVER", "SENDING", "EXECUTING", "EXECUTING"):
+    for state in ("QUEUED", "WAITING_FOR_SERVER", "SENDING", "EXECUTING"):
         lines.feed(story.goal(leaves[1], state))
     aborted = {"outcome": Outcome.ABORTED, "end": End.ABORTED, "reason": "a fault"}
     lines.feed(
@@ -107,8 +107,8 @@ def test_a_line_for_each_change_of_a_node_one_for_a_goal_under_way_and_one_for_i
         "    2.00 s  goal     Deliver / Work / Step 0: executing on move_robot",
         "    3.00 s  SUCCESS  Deliver / Work / Step 0",
         "    5.50 s  goal     Deliver / Work / Step 1: executing on move_robot",
-        "    7.00 s  goal     Deliver / Work / Step 1: ABORTED: a fault; its result is: {}",
-        "    7.50 s  FAILURE  Deliver / Work / Step 1: ABORTED",
+        "    6.50 s  goal     Deliver / Work / Step 1: ABORTED: a fault; its result is: {}",
+        "    7.00 s  FAILURE  Deliver / Work / Step 1: ABORTED",
     ]
 
 

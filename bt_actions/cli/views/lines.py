@@ -44,7 +44,6 @@ class LineView(View):
         self._verbose = verbose
         self._nodes: dict[int, Status] = {}
         """The status that each node's line told."""
-        self._goals: dict[int, object] = {}
         self._passing: dict[int, float] = {}
         """By leaf: since when its goal is in a state that is only told when it lasts."""
 
@@ -104,11 +103,9 @@ class LineView(View):
 
     def _goal(self, event: GoalChanged) -> None:
         key, action = event.node, self._state.action(event.node)
-        change = (event.goal_id, event.state, event.outcome, event.end)
         self._passing.pop(key, None)
-        if event.outcome is Outcome.SUCCEEDED or self._goals.get(key) == change:
-            return  # a success is told by the leaf's
-        self._goals[key] = change
+        if event.outcome is Outcome.SUCCEEDED:
+            return  # which is told by the leaf's
         is_over = event.outcome is not None
         if is_over and (event.state == DONE or event.end is not End.UNKNOWN):
             if action.goals[event.goal_id].verdict is not None:  # else that is to come
