@@ -21,11 +21,6 @@ from bt_actions.simulation.stepper import Stepper
 from bt_actions.simulation.world import World, WorldEvent
 from bt_actions.utilities.plain_text import raised
 
-BATTERY_PERIOD = 1.0
-"""The battery's charge is published that often, wall seconds;"""
-BATTERY_AT_FIRST, AT_FIRST = 0.05, 3.0
-"""and so often in the first seconds, in which whoever listens is not discovered yet."""
-
 
 class Simulation:
     """Robots that serve `move_robot` and `gripper_control` and carry a part between stations."""
@@ -70,10 +65,9 @@ class Simulation:
         try:
             for namespace in names:
                 self._cells[namespace] = RobotCell(
-                    platform,
+                    self._stepper,
                     namespace,
                     on_event=partial(self._tell, namespace),
-                    stepper=self._stepper,
                     faults=self._faults,
                     journal=self._journal,
                     result_timeout=result_timeout,
@@ -85,8 +79,6 @@ class Simulation:
             raise
         if self._faults.uses_chance:
             self._log.info(f"simulation: faults are drawn with seed {self.seed}")
-        self._began = self._stepper.now()
-        self._publish_batteries(self._began)
 
     def __repr__(self) -> str:
         return f"<Simulation {len(self._cells)} robots, speed {self._speed:g}>"
@@ -134,13 +126,6 @@ class Simulation:
         except Exception as error:  # noqa: BLE001 - a faulty listener must not end a goal
             self._on_event = None
             self._log.error(f"simulation: on_event raised {raised(error)} and is told no more")
-
-    def _publish_batteries(self, now: float, passed: float = 0.0) -> None:
-        for cell in self._cells.values():
-            cell.publish_battery(passed * self._speed)
-        period = BATTERY_AT_FIRST if now - self._began < AT_FIRST else BATTERY_PERIOD
-        again = partial(self._publish_batteries, passed=period)
-        self._stepper.call_at(now + period, again)
 
     def _kill_process(self) -> None:
         for server in self.servers:

@@ -36,6 +36,7 @@ class Stepper:
             if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} must be more than zero and finite, not {value!r}")
         self.platform = platform
+        self.speed = speed
         self.lock = threading.RLock()
         self.step_period = step_period
         self._wall_period = step_period / speed

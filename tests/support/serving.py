@@ -125,7 +125,7 @@ class Serving:
             self.node, namespaces=(name,), speed=speed, faults=faults, journal=journal
         )
         if not battery:
-            robot._cells[name].publish_battery = lambda _seconds: None  # type: ignore[method-assign]
+            robot._cells[name].battery.publish = lambda _seconds: None  # type: ignore[method-assign]
         self.servers[name] = robot
 
     def close(self, name: str) -> None:
