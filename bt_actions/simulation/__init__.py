@@ -18,6 +18,7 @@ from bt_actions.simulation.world import Part, Station, World, WorldEvent
 if TYPE_CHECKING:
     from bt_actions.simulation.gripper_control import GripperServer
     from bt_actions.simulation.move_robot import MoveRobotServer
+    from bt_actions.simulation.recorded.servers import RecordedServers
     from bt_actions.simulation.scripted import Script, ScriptedServer
     from bt_actions.simulation.simulation import Simulation
 
@@ -30,6 +31,7 @@ __all__ = [
     "GripperSimulator",
     "MoveRobotServer",
     "Part",
+    "RecordedServers",
     "RobotSimulator",
     "RobotStatus",
     "Script",
@@ -43,6 +45,7 @@ __all__ = [
 _NEED_MESSAGES = {
     "GripperServer": "gripper_control",
     "MoveRobotServer": "move_robot",
+    "RecordedServers": "recorded.servers",
     "Script": "scripted",
     "ScriptedServer": "scripted",
     "Simulation": "simulation",

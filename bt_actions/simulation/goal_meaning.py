@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from typing import Any, Protocol
 
@@ -61,9 +61,13 @@ class GoalMeaning(ABC):
     def result(self, motion: Motion, finish: Finish, reason: str) -> Any:
         """Return the result message of a goal that has ended."""
 
-    def failure(self, motion: Motion) -> str | None:
-        """Return why a goal that is done is to be aborted nevertheless, or None."""
-        return None
+    def due_feedback(self, motion: Motion) -> Sequence[Any]:
+        """Return the feedback messages of a step."""
+        return (self.feedback(motion),)
+
+    def verdict(self, motion: Motion) -> tuple[Finish, str]:
+        """Return how a goal that is done ends, and why where that is not COMPLETED."""
+        return Finish.COMPLETED, ""
 
     def halt(self, motion: Motion) -> None:  # noqa: B027 - nothing moves everywhere
         """Stand still: the goal has ended before it was done, or the server has died."""

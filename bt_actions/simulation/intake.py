@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bt_actions.simulation.fault_plan import FaultPlan, GoalFaults
+from bt_actions.simulation.fault_plan import GoalFaults
 from bt_actions.simulation.faults import FaultKind
 from bt_actions.simulation.journal import Event
 from bt_actions.utilities.plain_text import raised
@@ -36,15 +36,15 @@ class Intake:
     def __init__(
         self,
         server: str,
-        plan: FaultPlan,
+        strike: Callable[[Any, int], GoalFaults],
         *,
         record: Callable[..., None],
         warn: Callable[[str], None],
     ) -> None:
-        """`record` writes into the journal, `warn` into the log."""
+        """`strike` tells the faults of a goal; `record` writes into the journal, `warn` the log."""
         self.count = 0
         self._server = server
-        self._plan = plan
+        self._strike = strike
         self._record = record
         self._warn = warn
         self._undecided: dict[int, GoalRequest] = {}
@@ -53,7 +53,7 @@ class Intake:
     def receive(self, goal: object, goal_id: str) -> GoalRequest:
         """Take in a request for `goal`, whose message lives until the decision."""
         self.count += 1
-        faults = self._plan.strike(self._server, self.count)
+        faults = self._strike(goal, self.count)
         request = GoalRequest(goal_id, self.count, faults)
         more = {"faults": str(faults)} if faults else {}
         self._record(goal_id, Event.RECEIVED, number=request.number, **more)

@@ -183,8 +183,8 @@ class LiveGoal:
             times = max(1, min(FLOOD_AT_ONCE, int((now - self._last_feedback) * hertz)))
             self._last_feedback = now
         try:
-            message = self._owner.feedback(self.motion) if times else None
-            for _ in range(times):
+            messages = self._owner.due_feedback(self.motion) if times else ()
+            for message in [each for each in messages for _ in range(times)]:
                 self._wire.feedback(self.goal_id, message)
         except Exception as error:  # noqa: BLE001 - the goal must end whatever its script does
             self.give_up(self._broken(f"it has no feedback: {raised(error)}"))
@@ -202,8 +202,9 @@ class LiveGoal:
         self._over = True
         action_type = self._owner.action_type
         try:
-            if finish is Finish.COMPLETED and (why := self._owner.failure(self.motion)):
-                finish, reason = Finish.FAULT, why
+            if finish is Finish.COMPLETED:
+                verdict, why = self._owner.verdict(self.motion)
+                finish, reason = verdict, why or reason
             if finish is not Finish.COMPLETED:
                 self._owner.halt(self.motion)
             result = self._owner.result(self.motion, finish, reason)

@@ -83,8 +83,9 @@ class ScriptedServer(SimulatedServer):
         seconds = duration(goal) if callable(duration) else duration
         return _Wait(goal, seconds, self.stepper.step_period)
 
-    def failure(self, motion: Any) -> str | None:
-        return self.script.aborts(motion.goal) if self.script.aborts else None
+    def verdict(self, motion: Any) -> tuple[Finish, str]:
+        why = self.script.aborts(motion.goal) if self.script.aborts else None
+        return (Finish.FAULT, why) if why else (Finish.COMPLETED, "")
 
     def feedback(self, motion: Any) -> Any:
         if self.script.feedback:

@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from bt_actions.simulation.fault_plan import FaultPlan
+from bt_actions.simulation.fault_plan import FaultPlan, GoalFaults
 from bt_actions.simulation.faults import Fault, FaultKind
 from bt_actions.simulation.goal_meaning import Motion
 from bt_actions.simulation.intake import Intake
@@ -78,7 +78,7 @@ class SimulatedServer(Owner):
         self._preempts = preempts
         self._result_timeout = result_timeout
         self._on_death = on_death
-        self._intake = Intake(self.name, self.faults, record=self.record, warn=self._log.warning)
+        self._intake = Intake(self.name, self.strike, record=self.record, warn=self._log.warning)
         self._live: dict[str, LiveGoal] = {}
         self._results = ResultFaults(self.stepper, self._answer_result)
         self._closed = False
@@ -161,6 +161,10 @@ class SimulatedServer(Owner):
                 self.record(live.goal_id, Event.DIED, **state, reason=reason)
             if self._wire is not None:
                 self.record("", Event.CLOSED, reason=reason)
+
+    def strike(self, goal: Any, number: int) -> GoalFaults:
+        """Return the faults of a goal that is asked for, the server's `number`-th."""
+        return self.faults.strike(self.name, number)
 
     def record(self, goal_id: str, event: Event, **more: object) -> None:
         self.journal.write(self.name, goal_id, event, **more)

@@ -14,7 +14,13 @@ from functools import partial
 from typing import Any, Literal
 
 from action_msgs.msg import GoalInfo
-from rclpy.action.server import CancelResponse, GoalResponse, RCLError, ServerGoalHandle
+from rclpy.action.server import (
+    CancelResponse,
+    GoalEvent,
+    GoalResponse,
+    RCLError,
+    ServerGoalHandle,
+)
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -87,6 +93,8 @@ class InterceptedActionServer(ClosableActionServer):
             if status == STATUS_SUCCEEDED:
                 handle.succeed()
             elif status == STATUS_CANCELED:
+                if not handle.is_cancel_requested:  # nobody has asked: it cancels by itself
+                    handle._update_state(GoalEvent.CANCEL_GOAL)  # noqa: SLF001
                 handle.canceled()
             else:
                 handle.abort()

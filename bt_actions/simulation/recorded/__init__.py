@@ -1,0 +1,1 @@
+"""Servers that answer as those of a recorded run did, made from its events."""
