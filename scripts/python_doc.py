@@ -85,6 +85,7 @@ EVENTS_HEAD = """\
 
 What `TreeRunner.observe` tells, from `bt_actions.events`. All of them are values."""
 TESTING = ["VirtualNetwork", "VirtualRunner", "VirtualBackend", "ScriptedServer", "Script"]
+TESTING += ["serve_as_recorded", "RecordedServers"]
 TESTING_HEAD = """\
 ## Tests in virtual time
 

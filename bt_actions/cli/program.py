@@ -127,7 +127,7 @@ def _dispatch(argv: Sequence[str] | None) -> int:
 
 
 def _reach(args: argparse.Namespace) -> Reach:
-    if getattr(args, "sim", False):
+    if getattr(args, "sim", False) or getattr(args, "sim_like", None) is not None:
         return Reach.PROCESS
     return Reach.MACHINE if args.command == "sim" else Reach.NETWORK
 

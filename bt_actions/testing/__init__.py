@@ -15,19 +15,23 @@ from bt_actions.testing.network import VirtualNetwork
 from bt_actions.testing.runner import VirtualRunner
 
 if TYPE_CHECKING:
-    from bt_actions.simulation import Script, ScriptedServer, Simulation
+    from bt_actions.simulation import RecordedServers, Script, ScriptedServer, Simulation
+    from bt_actions.testing.recorded import serve_as_recorded
 
 __all__ = [
+    "RecordedServers",
     "Script",
     "ScriptedServer",
     "Simulation",
     "VirtualBackend",
     "VirtualNetwork",
     "VirtualRunner",
+    "serve_as_recorded",
 ]
 
 
 def __getattr__(name: str) -> object:
     if name in __all__:
-        return getattr(importlib.import_module("bt_actions.simulation"), name)
+        late = "testing.recorded" if name == "serve_as_recorded" else "simulation"
+        return getattr(importlib.import_module(f"bt_actions.{late}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -76,6 +76,8 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["sim", "--speed", "1e-300"], "'1e-300' is no factor from 1e-05 to 100000"),
         (["run", "t", "--fault", "a:1:abort"], "--fault is about the simulation"),
         (["run", "t", "--check-part", "5"], "--check-part is about the simulation"),
+        (["run", "t", "--sim-like", "r", "--check-part", "5"], "--check-part is about the simul"),
+        (["run", "t", "--sim-like", "r", "--sim"], "not allowed with argument --sim-like"),
         (["run", "t", "--sim", "--fault", "nonsense"], "--fault"),
         (["render", "t", "-o", "t.pdf"], "t.pdf: cannot tell the format"),
         (["send", "a" * 121, "MoveRobot"], "it has more than 120 characters"),

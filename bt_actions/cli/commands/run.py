@@ -7,6 +7,7 @@ Puts together what others do: loads the tree (document), starts the servers (sim
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.loading import load
@@ -29,6 +30,7 @@ examples:
   bt-actions run pick_and_place --sim --speed 10
   bt-actions run trees/pick_and_place.yaml --set pick_at=2.0 --set place_at=4.5
   bt-actions run pick_and_place --sim --fault move_robot:2:abort
+  bt-actions run pick_and_place --sim-like pick_and_place    # as in its newest recorded run
   bt-actions run patrol --namespace /r1 --timeout 600 --json
   bt-actions run patrol --ros-args --params-file patrol.yaml -p use_sim_time:=true
 
@@ -88,8 +90,15 @@ def add_parser(subparsers: Subparsers) -> None:
     )
     add_options(parser, one_run=True)
     simulated = parser.add_argument_group("simulation")
-    simulated.add_argument(
+    servers = simulated.add_mutually_exclusive_group()
+    servers.add_argument(
         "--sim", action="store_true", help="run simulated action servers in this process"
+    )
+    servers.add_argument(
+        "--sim-like",
+        metavar="RUN",
+        help="run action servers that answer as those of a recorded run did: a file, the first "
+        "letters of its id, or a tree for its newest run",
     )
     add_option(
         simulated,
@@ -115,6 +124,8 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         keep_results_apart()
     _refuse_without_sim(args)
+    like = None if args.sim_like is None else _recorded(args.sim_like)
+    is_simulated = args.sim or like is not None
     records = recorder(args)
     root = load(
         args.tree,
@@ -123,7 +134,7 @@ def run(args: argparse.Namespace) -> int:
         parameters=(lambda tree: _given(args, tree)) if args.ros_args else None,
     )
 
-    cleans_up = args.cleanup_first and not args.sim  # which is private
+    cleans_up = args.cleanup_first and not is_simulated  # which is private
     servers = _servers(args, root) if cleans_up else []
     outlook = _outlook()  # early: it is to have seen other nodes when ours gets its name
     try:
@@ -139,7 +150,7 @@ def run(args: argparse.Namespace) -> int:
     except BaseException:
         outlook.close()
         raise
-    wish = SimulationWish(args.speed or 1.0, args.fault, args.seed) if args.sim else None
+    wish = SimulationWish(args.speed or 1.0, args.fault, args.seed, like) if is_simulated else None
     with Session(
         root,
         executor=args.executor,
@@ -189,6 +200,16 @@ def _servers(args: argparse.Namespace, root: Behaviour) -> list[str]:
 def _refuse_without_sim(args: argparse.Namespace) -> None:
     if args.sim:
         return
-    for option in ("--fault", "--speed", "--seed", "--check-part"):
+    without = ("--check-part", *(() if args.sim_like else ("--fault", "--speed", "--seed")))
+    for option in without:
         if getattr(args, option[2:].replace("-", "_")) not in (None, []):
             raise BadInput(f"{option} is about the simulation; it needs --sim")
+
+
+def _recorded(run: str) -> Path:
+    from bt_actions.recording.folders import NoRun, find
+
+    try:
+        return find(run)
+    except NoRun as error:
+        raise BadInput(f"--sim-like: {error}") from error

@@ -12,7 +12,8 @@ import logging
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self, TypeVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from py_trees.behaviour import Behaviour
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from bt_actions.recording.recorder import Recorder
     from bt_actions.ros.naming import Outlook
     from bt_actions.running.runner import TreeRunner
+    from bt_actions.simulation import RecordedServers, Simulation
     from bt_actions.simulation.faults import Fault
     from bt_actions.simulation.world import Part
 
@@ -44,11 +46,13 @@ PART_TOLERANCE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class SimulationWish:
-    """What --sim and its companions ask for."""
+    """What --sim or --sim-like and its companions ask for."""
 
     speed: float = 1.0
     faults: Sequence[Fault] = ()
     seed: int | None = None
+    like: Path | None = None
+    """The recorded run whose servers are played; None for simulated robots."""
 
 
 class Session:
@@ -93,10 +97,10 @@ class Session:
         self._simulator = None
         if simulation is not None:
             robots = wanted(root, self._runner.node.get_namespace().rstrip("/"))
-            if said := remark(robots):
+            if said := remark(robots, recorded=simulation.like is not None):
                 note(f"bt-actions: {said}")
             try:
-                self._simulator = _Simulator(self._runner, robots, simulation)
+                self._simulator = _Simulator(self._runner, root, robots, simulation)
             except BaseException:
                 self._runner.shutdown()
                 raise
@@ -187,7 +191,7 @@ class Session:
 
     def _world(self, part_at: float | None) -> tuple[str, str]:
         """Return what the simulated world looks like, and what is not as it should be."""
-        if self._simulator is None or not self._simulator.parts:
+        if self._simulator is None or not self._simulator.said:
             return "", ""
         wrong = [
             namespace
@@ -205,37 +209,52 @@ class Session:
 class _Simulator:
     """Simulated servers on a node of their own, in the executor that the tree's node is in too."""
 
-    def __init__(self, runner: TreeRunner, robots: Wanted, wish: SimulationWish) -> None:
+    def __init__(
+        self, runner: TreeRunner, root: Behaviour, robots: Wanted, wish: SimulationWish
+    ) -> None:
         """Bring the servers up before anything spins.
 
-        Raises BadInput when a fault fits none of the servers.
+        Raises BadInput when a fault fits none of the servers, or no run can be read.
         """
         from bt_actions.ros.spinning import node_beside
-        from bt_actions.simulation import FaultError, Simulation
+        from bt_actions.simulation import FaultError
 
         self._namespaces = robots.namespaces
         self._node = node_beside(runner.node, "simulation")
         self.parts: dict[str, Part] = {}
         """By namespace, as they were when the run was over; empty before."""
         self.said = ""
+        self._simulation: Simulation | RecordedServers | None = None
         runner.on_close(self._close)
         try:
-            self._simulation = Simulation(
-                self._node,
-                namespaces=self._namespaces,
-                speed=wish.speed,
-                faults=wish.faults,
-                seed=wish.seed,
-            )
+            self._simulation = self._serve(root, wish)
         except FaultError as error:
             raise BadInput(f"--fault {error}") from error
         runner.executor.add_node(self._node)
 
+    def _serve(self, root: Behaviour, wish: SimulationWish) -> Simulation | RecordedServers:
+        settings: dict[str, Any] = {"speed": wish.speed, "faults": wish.faults, "seed": wish.seed}
+        if wish.like is None:
+            from bt_actions.simulation import Simulation
+
+            return Simulation(self._node, namespaces=self._namespaces, **settings)
+        from bt_actions.recording.reading import RecordingError
+        from bt_actions.testing import serve_as_recorded
+
+        try:
+            servers = serve_as_recorded(self._node, root, wish.like, **settings)
+        except RecordingError as error:
+            raise BadInput(f"--sim-like {error}") from error
+        for said in servers.remarks:
+            note(f"bt-actions: --sim-like: {said}")
+        return servers
+
     def _close(self) -> None:
         """Take note of the world and destroy it all."""
-        simulation = getattr(self, "_simulation", None)
+        simulation = self._simulation
         if simulation is not None:
-            self.parts = {name: simulation.world(name).part for name in self._namespaces}
+            if hasattr(simulation, "world"):
+                self.parts = {name: simulation.world(name).part for name in self._namespaces}
             self.said = simulation.describe()
             simulation.close()
         self._node.destroy_node()

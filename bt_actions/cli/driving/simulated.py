@@ -26,7 +26,9 @@ class Wanted:
     namespaces: Sequence[str]
     """Of the robots; "/" is the root. Never empty."""
     others: Sequence[str]
-    """The servers that no simulated robot has, as `name (type)`."""
+    """The servers that no simulated robot has, as `name (type)`,"""
+    services: Sequence[str] = ()
+    """and those of services among them."""
 
 
 def wanted(root: Behaviour, namespace: str = "") -> Wanted:
@@ -34,7 +36,7 @@ def wanted(root: Behaviour, namespace: str = "") -> Wanted:
     from bt_actions import render
 
     namespaces: dict[str, None] = {}
-    others: dict[str, None] = {}
+    others: dict[str, str] = {}
     for row in render.rows(root):
         node = row.node
         for sort in ("action", "service"):
@@ -47,12 +49,19 @@ def wanted(root: Behaviour, namespace: str = "") -> Wanted:
             if package == _PACKAGE and SERVED.get(word) == last:
                 namespaces[above or "/"] = None
             else:
-                others[f"{full} ({word})"] = None
-    return Wanted(tuple(namespaces) or (namespace or "/",), tuple(others))
+                others[f"{full} ({word})"] = sort
+    services = tuple(each for each, sort in others.items() if sort == "service")
+    return Wanted(tuple(namespaces) or (namespace or "/",), tuple(others), services)
 
 
-def remark(found: Wanted) -> str:
-    """Say in one line which servers must come from elsewhere; empty when none."""
+def remark(found: Wanted, *, recorded: bool = False) -> str:
+    """Say in one line which servers must come from elsewhere; empty when none.
+
+    `recorded`: the actions are served as in a recorded run.
+    """
+    if recorded:
+        names = ", ".join(found.services)
+        return f"--sim-like serves actions; it has no server for {names}" if names else ""
     if not found.others:
         return ""
     names = " and ".join(SERVED.values())
