@@ -48,11 +48,11 @@ def is_finished(part: Path) -> bool:
 
 
 def finish(first: Path) -> bool:
-    """Finish the files of a run unless somebody writes or follows them; return whether they are.
+    """Finish the files of a run unless somebody writes them; return whether they are finished.
 
     Each file is replaced as a whole. Raises OSError.
     """
-    with held(first.parent, alone=True) as alone:
+    with held(first.parent), held(first, alone=True) as alone:
         if alone:
             for part in parts_of(first):
                 if not is_finished(part):

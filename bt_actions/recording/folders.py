@@ -2,7 +2,8 @@
 
 Each run has a folder, called by its time, its tree and the first letters of its id, below the state
 directory of the user. Beside the files of events stands a summary, so that a list of runs reads no
-events. A lock on the folder tells whether anybody writes or follows the run.
+events. A lock on the folder keeps it from being removed, and one on the first file tells that the
+run goes on.
 """
 
 from __future__ import annotations
@@ -68,8 +69,8 @@ class Recorded:
 
     first: Path
     summary: Summary
-    is_held: bool
-    """Whether somebody writes or follows it."""
+    is_written: bool
+    """Whether the run goes on."""
 
     @property
     def parts(self) -> list[Path]:
@@ -155,7 +156,7 @@ def recorded(where: Path | None = None) -> list[Recorded]:
     except OSError:
         return []
     found = [
-        Recorded(first, read_summary(first) or _guessed(first), is_held(first.parent))
+        Recorded(first, read_summary(first) or _guessed(first), is_written(first))
         for first in firsts
     ]
     return sorted(found, key=lambda each: each.summary.began, reverse=True)
@@ -205,12 +206,17 @@ def find(text: str = "", where: Path | None = None) -> Path:
 
 
 @contextlib.contextmanager
-def held(folder: Path, *, alone: bool = False) -> Iterator[bool]:
-    """Hold a folder, so that nobody removes it; `alone`: yield whether nobody else held it."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+def held(path: Path, *, alone: bool = False, waits: bool = False) -> Iterator[bool]:
+    """Hold a folder, so that nobody removes it, or a first file, so that nobody else writes it.
+
+    With `alone`, yield whether nobody else holds it, now or, with `waits`, in the end. Raises
+    OSError.
+    """
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
         try:
-            fcntl.flock(descriptor, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
+            how = fcntl.LOCK_EX if alone else fcntl.LOCK_SH
+            fcntl.flock(descriptor, how | (0 if waits else fcntl.LOCK_NB))
             yield True
         except BlockingIOError:
             yield False
@@ -218,10 +224,10 @@ def held(folder: Path, *, alone: bool = False) -> Iterator[bool]:
         os.close(descriptor)
 
 
-def is_held(folder: Path) -> bool:
-    """Whether anybody writes or follows a run."""
+def is_written(first: Path) -> bool:
+    """Whether a process writes the run, or finishes its files."""
     try:
-        with held(folder, alone=True) as alone:
+        with held(first, alone=True) as alone:
             return not alone
     except OSError:
         return False
@@ -239,8 +245,8 @@ def prune(
     for run in recorded(where):
         mine, kind = run.size, run.summary.failed
         total += mine
-        left[kind] -= not run.is_held
-        if run.is_held or (left[kind] >= 0 and total <= size):
+        left[kind] -= not run.is_written
+        if run.is_written or (left[kind] >= 0 and total <= size):
             continue
         with contextlib.suppress(OSError), held(run.first.parent, alone=True) as alone:
             if alone:

@@ -81,6 +81,17 @@ def records(file: BinaryIO) -> Iterator[Record]:
         yield from _opened(kind, payload)
 
 
+def whole_length(data: bytes) -> int:
+    """Return how many bytes of what was read of a file so far are whole records."""
+    at = len(MAGIC) if data.startswith(MAGIC) else 0
+    while at + _HEAD.size <= len(data):
+        end = at + _HEAD.size + _HEAD.unpack_from(data, at)[1]
+        if end > len(data):
+            break
+        at = end
+    return at
+
+
 def _opened(kind: int, payload: bytes) -> Iterator[Record]:
     """The record of a payload, or those of a chunk; nothing of what is damaged."""
     try:

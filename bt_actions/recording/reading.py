@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import BinaryIO, TypeAlias
 
 from py_trees.common import Status
 
@@ -80,6 +80,7 @@ class Recording:
         self._base: int | None = None
         """Nanoseconds by which the log's time is ahead of the steady clock."""
         self._names: set[str] = set()
+        self.begin_part()
         self._nodes = 0
 
     def state(self) -> State:
@@ -101,34 +102,37 @@ class Recording:
         RecordingError.
         """
         for part in parts_of(self.first) or [self.first]:
-            for item in self._items_of(part):
-                self._check(item)
-                yield item
+            try:
+                with part.open("rb") as file:
+                    self.begin_part()
+                    yield from self.items_in(file)
+            except NoMcap as error:
+                raise RecordingError(f"{part} is no recording: {error}") from error
+            except OSError as error:
+                raise RecordingError(f"{part} cannot be read: {error.strerror}") from error
+
+    def begin_part(self) -> None:
+        """Take note that what is read next is another file, with numbers of its own for topics."""
+        self._layouts, self._schemas = dict(_BY_NUMBER), dict[int, str]()
+
+    def items_in(self, file: BinaryIO) -> Iterator[Item]:
+        """Yield what is in a file, or in more of it; raises NoMcap, OSError, RecordingError."""
+        for record in records(file):
+            if isinstance(record, Message):
+                layout = self._layouts.get(record.channel)
+                for item in () if layout is None else self._taken(record, layout):
+                    self._check(item)
+                    yield item
+            elif isinstance(record, Schema):
+                self._schemas[record.number] = record.name
+            elif isinstance(record, Channel):
+                found = _BY_TYPE.get(self._schemas.get(record.schema, ""))
+                if found is not None:
+                    self._layouts[record.number] = found
+            else:
+                self._attached(record)
 
     # Within
-
-    def _items_of(self, part: Path) -> Iterator[Item]:
-        layouts = dict(_BY_NUMBER)
-        schemas: dict[int, str] = {}
-        try:
-            with part.open("rb") as file:
-                for record in records(file):
-                    if isinstance(record, Message):
-                        layout = layouts.get(record.channel)
-                        if layout is not None:
-                            yield from self._taken(record, layout)
-                    elif isinstance(record, Schema):
-                        schemas[record.number] = record.name
-                    elif isinstance(record, Channel):
-                        found = _BY_TYPE.get(schemas.get(record.schema, ""))
-                        if found is not None:
-                            layouts[record.number] = found
-                    else:
-                        self._attached(record)
-        except NoMcap as error:
-            raise RecordingError(f"{part} is no recording: {error}") from error
-        except OSError as error:
-            raise RecordingError(f"{part} cannot be read: {error.strerror}") from error
 
     def _attached(self, attachment: Attachment) -> None:
         path = attachment.name.removeprefix("trees/")

@@ -176,6 +176,7 @@ class _Run:
                 first = folder_for(began.run_id, began.tree, began.at.wall, where) / FIRST
             self._locks.enter_context(held(first.parent))
             self._writer = RunWriter(first, began, values=wish.values, say=self._say)
+            self._locks.enter_context(held(first, alone=True, waits=True))
             self.first = first
             write_summary(first, _summary(began))
         except OSError as error:

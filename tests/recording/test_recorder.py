@@ -25,7 +25,7 @@ from bt_actions.events import (
 )
 from bt_actions.events.stream import Stream
 from bt_actions.recording.finishing import is_finished
-from bt_actions.recording.folders import is_held, read_summary, recorded
+from bt_actions.recording.folders import is_written, read_summary, recorded
 from bt_actions.recording.reading import Recording
 from bt_actions.recording.recorder import BEAT, Recorder, Wish
 from tests.support.every_kind import NODES, RUN_ID
@@ -73,7 +73,7 @@ def test_a_run_is_in_its_folder_from_its_first_event_on(recorder: Recorder, tmp_
     begin(stream)
     until(lambda: len(recorded(tmp_path)) == 1 and read_summary(recorded(tmp_path)[0].first))
     [run] = recorded(tmp_path)
-    assert run.is_held
+    assert run.is_written
     assert run.first.parent.stat().st_mode & 0o777 == 0o700
     assert (run.summary.tree, run.summary.status, run.summary.failed) == ("tree", "", True)
 
@@ -85,7 +85,7 @@ def test_the_end_of_a_run_closes_and_finishes_its_file(recorder: Recorder, tmp_p
     end(stream, Status.FAILURE, 1)
     until(lambda: recorded(tmp_path) and is_finished(recorded(tmp_path)[0].first))
     [run] = recorded(tmp_path)
-    assert not is_held(run.first.parent)
+    assert not is_written(run.first)
     assert not stream.is_read
     summary = run.summary
     assert (summary.status, summary.exit_code, summary.failed) == ("FAILURE", 1, True)

@@ -1,0 +1,92 @@
+"""Follows a run while it is written: what has come since the last look, whole records only.
+
+A file that is finished meanwhile is another file under the same name. The place of a follower is
+the number of the latest event, which both have.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from pathlib import Path
+
+from bt_actions.events import EventsLost
+from bt_actions.recording.folders import held, parts_of
+from bt_actions.recording.mcap_records import MAGIC, whole_length
+from bt_actions.recording.reading import Item, Recording
+from bt_actions.story.state import State
+
+
+class Follower:
+    """Follows one run; nobody removes its folder meanwhile. Close it, or use it as a context."""
+
+    def __init__(self, first: Path) -> None:
+        """Raises OSError where there is no such run."""
+        self._holds = contextlib.ExitStack()
+        self._holds.enter_context(held(first.parent))
+        self.recording = Recording(first)
+        """What is known of the run so far beside its events: files, heartbeat, damage."""
+        self._part, self._inode = first, 0
+        self._at = 0
+        """Bytes of the present file that were read."""
+        self._number = 0
+
+    def look(self) -> list[Item]:
+        """Return what has come since the last look: events, and a state where some are missing.
+
+        Raises OSError, and ValueError for a file that is none of ours.
+        """
+        found: list[Item] = []
+        while True:
+            found += self._more()
+            parts = parts_of(self.recording.first)
+            later = [each for each in parts if parts.index(each) > self._place(parts)]
+            if not later:
+                return found
+            self._turn_to(later[0])
+
+    def close(self) -> None:
+        """Let go of the run."""
+        self._holds.close()
+
+    def __enter__(self) -> Follower:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _place(self, parts: list[Path]) -> int:
+        """Where the present file stands; before all that there are where it was removed."""
+        return parts.index(self._part) if self._part in parts else 0
+
+    def _turn_to(self, part: Path) -> None:
+        self._part, self._at, self._inode = part, 0, 0
+
+    def _more(self) -> list[Item]:
+        try:
+            file = self._part.open("rb")
+        except FileNotFoundError:  # the oldest of a long run are removed
+            return []
+        with file:
+            inode = os.fstat(file.fileno()).st_ino
+            if inode != self._inode:
+                self._inode, self._at = inode, 0
+                self.recording.begin_part()
+            file.seek(self._at)
+            data = file.read()
+        length = whole_length(data)
+        if not length:
+            return []
+        head = b"" if self._at == 0 else MAGIC
+        self._at += length
+        items = self.recording.items_in(io.BytesIO(head + data[:length]))
+        return [item for item in items if self._is_new(item)]
+
+    def _is_new(self, item: Item) -> bool:
+        at = item.now if isinstance(item, State) else item.at
+        if at is None or at.number <= self._number:
+            return False
+        if not isinstance(item, EventsLost):  # which has the number of what follows
+            self._number = at.number
+        return True

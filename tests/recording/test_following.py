@@ -1,0 +1,113 @@
+"""Following a run while it is written, through its end and its finishing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bt_actions.events import Event, RunBegan
+from bt_actions.recording.finishing import finish, is_finished
+from bt_actions.recording.folders import prune
+from bt_actions.recording.following import Follower
+from bt_actions.recording.reading import Item
+from bt_actions.recording.writing import RunWriter
+from bt_actions.story.state import State
+from bt_actions.story.words import last_words
+from tests.recording.test_folders import made
+from tests.support.every_kind import every_kind
+from tests.support.stories import state_of
+
+
+def writer_of(first: Path, events: list[Event], **options: int) -> RunWriter:
+    began = next(each for each in events if isinstance(each, RunBegan))
+    return RunWriter(first, began, **options)
+
+
+def folded(items: list[Item]) -> State:
+    state = State()
+    for item in items:
+        if isinstance(item, State):
+            state = item
+        else:
+            state.observe(item)
+    return state
+
+
+@pytest.mark.parametrize("size", [10**6, 20_000])
+def test_a_follower_gets_each_event_once_however_often_it_looks(tmp_path: Path, size: int) -> None:
+    events, first = every_kind(rounds=20), tmp_path / "run.mcap"
+    writer = writer_of(first, events, size=size)
+    found: list[Item] = []
+    with Follower(first) as follower:
+        for number, event in enumerate(events):
+            writer.add(event)
+            writer.flush()
+            if number % 3 == 0:
+                found += follower.look()
+        writer.close()
+        found += follower.look()
+        assert follower.look() == []
+        assert finish(first)
+        assert is_finished(first)
+        assert follower.look() == []
+    assert list(map(repr, found)) == list(map(repr, events))
+
+
+def test_what_is_half_written_is_read_when_it_is_whole(tmp_path: Path) -> None:
+    events, first = every_kind(), tmp_path / "run.mcap"
+    writer = writer_of(first, events)
+    for event in events:
+        writer.add(event)
+    writer.close()
+    data = first.read_bytes()
+    found: list[Item] = []
+    first.write_bytes(b"")
+    with Follower(first) as follower:
+        for at in range(0, len(data), 97):
+            with first.open("ab") as file:
+                file.write(data[at : at + 97])
+            found += follower.look()
+    assert list(map(repr, found)) == list(map(repr, events))
+
+
+def test_a_run_that_is_finished_between_two_looks_goes_on_where_it_was(tmp_path: Path) -> None:
+    events, first = every_kind(rounds=20), tmp_path / "run.mcap"
+    writer = writer_of(first, events)
+    with Follower(first) as follower:
+        for event in events[:100]:
+            writer.add(event)
+        writer.flush()
+        found = follower.look()
+        for event in events[100:]:
+            writer.add(event)
+        writer.close()
+        finish(first)
+        found += follower.look()
+    assert list(map(repr, found)) == list(map(repr, events))
+
+
+def test_a_follower_that_was_too_late_for_a_file_gets_the_state_behind_it(tmp_path: Path) -> None:
+    events, first = every_kind(rounds=60), tmp_path / "run.mcap"
+    writer = writer_of(first, events, size=20_000, files=3)
+    with Follower(first) as follower:
+        for event in events[:50]:
+            writer.add(event)
+        writer.flush()
+        found = follower.look()
+        for event in events[50:]:
+            writer.add(event)
+            writer.flush()
+        writer.close()
+        found += follower.look()
+    assert any(isinstance(each, State) for each in found)
+    assert last_words(folded(found)) == last_words(state_of(events))
+
+
+def test_what_is_followed_is_not_removed(tmp_path: Path) -> None:
+    first = made(tmp_path, 1)
+    with Follower(first):
+        prune(tmp_path, succeeded=0)
+        assert first.exists()
+    prune(tmp_path, succeeded=0)
+    assert not first.exists()
