@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import random
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -331,3 +333,27 @@ def test_of_a_bag_with_two_runs_one_is_read(tmp_path: Path) -> None:
     state = Recording(tmp_path / "bag.mcap").state()
     assert state.tree == "all"
     assert Recording(tmp_path / "bag.mcap", run_id="0f" * 16).state().tree == "other"
+
+
+@pytest.mark.slow
+def test_a_large_file_takes_no_more_memory_than_a_small_one(tmp_path: Path) -> None:
+    """Kilobytes of the process at its highest, as a program of its own has them."""
+    written(tmp_path / "run.mcap", every_kind(rounds=50))
+    data = (tmp_path / "run.mcap").read_bytes()
+    messages = data[next(e for e in ends_of_records(data) if data[e] == mcap_records.MESSAGE) :]
+    program = (
+        "import sys; from pathlib import Path\n"
+        "from bt_actions.recording.reading import Recording\n"
+        "print(Recording(Path(sys.argv[1])).state().status.value)\n"
+        "print(*[s.split()[1] for s in open('/proc/self/status') if 'VmHWM' in s])\n"
+    )
+    peaks = []
+    for times in (1, 400):
+        with (tmp_path / "run.mcap").open("wb") as file:
+            file.writelines([data, *[messages] * times])
+        command = [sys.executable, "-c", program, str(tmp_path / "run.mcap")]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        peaks.append(int(done.stdout.split()[-1]))
+    assert (tmp_path / "run.mcap").stat().st_size > 50_000_000
+    assert peaks[1] - peaks[0] < 40_000
+    assert peaks[1] < 300_000
