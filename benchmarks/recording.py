@@ -20,9 +20,13 @@ from benchmarks.chain import ACTION, GOALS
 from benchmarks.harness import MANY, Family, Figures, Row
 from benchmarks.wire import Wire
 from bt_actions import ActionBehaviour, TreeRunner
+from bt_actions.events import Moment, Node, NodeChanged, RunBegan
 from bt_actions.events.stream import Stream
+from bt_actions.recording.finishing import finish_beside
 from bt_actions.recording.recorder import Recorder, Wish
+from bt_actions.recording.writing import RunWriter
 
+LARGE = 100_000_000
 RATE, TICKS, CHANGES = 100.0, 500, 10
 """Ticks a second, ticks in all, and events in each."""
 
@@ -69,10 +73,41 @@ def _shown(stream: Stream) -> Callable[[], None]:
     return close
 
 
+def _finishes(stream: Stream) -> Callable[[], None]:
+    """Have the files of another run, of 100 MB, finished meanwhile."""
+    folder = tempfile.TemporaryDirectory()
+    first = Path(folder.name) / "run.mcap"
+    began = RunBegan(
+        Moment(1, 1.0, 1.0, 1.0), "0" * 32, "long", (Node(1, None, "a", "b"),), {}, {}, {}
+    )
+    writer = RunWriter(first, began)
+    writer.add(began)
+    writer.flush()
+    head = first.stat().st_size
+    for number in range(2000):
+        at = Moment(2 + number, 1.0 + number, 1.0 + number, 1.0)
+        writer.add(NodeChanged(at, 1, Status.SUCCESS, f"said {number}"))
+    writer.close()
+    data = first.read_bytes()
+    with first.open("ab") as file:
+        while file.tell() < LARGE:
+            file.write(data[head:])
+    process = finish_beside(first, may_wait=False)
+
+    def close() -> None:
+        assert process is not None
+        process.kill()
+        process.wait()
+        folder.cleanup()
+
+    return close
+
+
 _READERS: dict[str, Callable[[Stream], Callable[[], None]]] = {
     "alone": lambda stream: lambda: None,
     "recorded": _recorded,
     "shown": _shown,
+    "while 100 MB are finished": _finishes,
 }
 
 
@@ -154,7 +189,7 @@ CHAINS = Family(
         )
         for name, at_most in (("recorded", 1.03), ("shown", 1.1))
     ],
-    {name: lambda name=name: _served(name) for name in _READERS},
+    {name: lambda name=name: _served(name) for name in ("alone", "recorded", "shown")},
     MANY,
 )
 TICKED = Family(
@@ -168,7 +203,8 @@ TICKED = Family(
             0.2,
             is_difference=True,
         )
-        for name in ("recorded", "shown")
+        for name in _READERS
+        if name != "alone"
     ],
     {name: lambda name=name: processes.side("recording", f"tick {name}") for name in _READERS},
     MANY,

@@ -60,8 +60,8 @@ def finish(first: Path) -> bool:
         return alone
 
 
-def finish_beside(first: Path, *, may_wait: bool) -> None:
-    """Finish a run's files without holding up a tick: large ones in a process of its own.
+def finish_beside(first: Path, *, may_wait: bool) -> subprocess.Popen[bytes] | None:
+    """Finish a run's files without holding up a tick: large ones in a process, which is returned.
 
     Small ones are finished here where the caller may wait, and else when they are opened. Raises
     OSError.
@@ -69,8 +69,8 @@ def finish_beside(first: Path, *, may_wait: bool) -> None:
     if sum(part.stat().st_size for part in parts_of(first)) <= AT_ONCE:
         if may_wait:
             finish(first)
-        return
-    subprocess.Popen(
+        return None
+    return subprocess.Popen(
         [sys.executable, "-P", "-m", __name__, str(first)],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
