@@ -55,6 +55,7 @@ class TreeRunner:
         namespace: of the node that is made here.
         name: of that node; one that no other has where it is left out.
         context: for that node; it is shut down with it.
+        asked_by: the id of the RunTree goal that the runs answer, and that of its caller's run.
 
     Use it as a context manager, or call `shutdown` in the end. Not reentrant, but may run again:
     the tree is set up once. It works in a callback of anybody else's executor.
@@ -70,6 +71,7 @@ class TreeRunner:
         namespace: str = "",
         name: str = "",
         context: Any = None,
+        asked_by: tuple[str, str] = ("", ""),
     ) -> None:
         if not heartbeat > 0.0:
             raise ValueError(f"heartbeat must be more than zero seconds, not {heartbeat!r}")
@@ -106,6 +108,7 @@ class TreeRunner:
             check=self._check,
             misbehaved=self._spinner.taken_away,
         )
+        self._loop.teller.asked_by = asked_by
         # Before the exit hook of ros/exit.py: a tree that ticks on would send another goal,
         # and a daemon thread in spin() aborts the process that ends beside it.
         atexit.register(self._at_exit)
@@ -124,15 +127,6 @@ class TreeRunner:
     def unaccounted(self) -> list[GoalReport]:
         """The goals of this tree whose end is UNKNOWN, by now."""
         return self._loop.goals.unaccounted
-
-    @property
-    def asked_by(self) -> tuple[str, str]:
-        """The id of the RunTree goal that the runs answer, and that of its caller's run."""
-        return self._loop.teller.asked_by
-
-    @asked_by.setter
-    def asked_by(self, ids: tuple[str, str]) -> None:
-        self._loop.teller.asked_by = ids
 
     @property
     def stream(self) -> Stream:

@@ -116,8 +116,7 @@ class Run:
         leaves = [each for each in root.iterate() if isinstance(each, ActionBehaviour)]
         self._begins({server_name(self._node, each.action_name) for each in leaves})
         status, error = Status.INVALID, None
-        runner = TreeRunner(root, node=self._node)
-        runner.asked_by = self._asked_by
+        runner = TreeRunner(root, node=self._node, asked_by=self._asked_by)
         if self._recorder is not None:
             self._recorder.record(runner.stream, runner.ticks_since)
         try:
