@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from types import FrameType
 
 from py_trees.behaviour import Behaviour
@@ -21,6 +22,15 @@ def path_of(behaviour: Behaviour) -> tuple[str, ...]:
         behaviour = behaviour.parent
         names.append(behaviour.name)
     return tuple(reversed(names))
+
+
+def in_order(root: Behaviour) -> Iterator[Behaviour]:
+    """Yield every node below and including `root`, parents first; not bounded by recursion."""
+    waiting = [root]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting.extend(reversed(node.children))
 
 
 def innermost(frame: FrameType | None) -> Behaviour | None:

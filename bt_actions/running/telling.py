@@ -6,7 +6,7 @@ import contextlib
 import platform
 import sys
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 
@@ -17,6 +17,7 @@ from py_trees.trees import BehaviourTree
 from bt_actions import document
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.connected import Timed
+from bt_actions.behaviours.places import in_order
 from bt_actions.behaviours.variables import overhear, overhear_less
 from bt_actions.document.describing import describe
 from bt_actions.events import Node, NodeChanged, NodesAdded, NodesRemoved, RunBegan, TreeFinished
@@ -90,7 +91,7 @@ class TreeTeller(Teller):
             RunBegan,
             self.run_id,
             document.tree_name(root),
-            self._new(_in_order(root)),
+            self._new(in_order(root)),
             {
                 name: HIDDEN if each.secret else snapshot(value)
                 for name, (each, value) in given.items()
@@ -104,7 +105,7 @@ class TreeTeller(Teller):
         """Tell of nodes that were inserted since the run began, and of those taken out."""
         if not (self._has_begun and self.is_heard):
             return
-        nodes = list(_in_order(self._tree.root))
+        nodes = list(in_order(self._tree.root))
         gone = {each for each in set(self.numbers).difference(nodes) if _is_over(each)}
         if gone:
             self.stream.add(NodesRemoved, tuple(sorted(self.numbers.pop(each) for each in gone)))
@@ -181,15 +182,6 @@ def where_raised(error: BaseException) -> str:
     cause = error.__cause__ or error
     frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)
     return f"{error} ({frames[-1].filename}:{frames[-1].lineno})" if frames else str(error)
-
-
-def _in_order(root: Behaviour) -> Iterator[Behaviour]:
-    """Yield every node below and including `root`, parents first; not bounded by recursion."""
-    waiting = [root]
-    while waiting:
-        node = waiting.pop()
-        yield node
-        waiting.extend(reversed(node.children))
 
 
 @lru_cache(maxsize=1)

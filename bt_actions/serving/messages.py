@@ -38,11 +38,12 @@ def result(outcome: RunOutcome) -> RunTree.Result:
 def feedback(run: Run, *, begun: bool) -> RunTree.Feedback:
     """Return how far a run is."""
     with run.told() as state:
-        leaves = [_leaf(state, each) for each in state.running[:SHOWN]]
-        ended = state.leaves_ended
-    return RunTree.Feedback(
-        running=leaves, leaves_ended=ended, paused=run.paused, waiting=not begun
-    )
+        return RunTree.Feedback(
+            running=[_leaf(state, each) for each in state.running[:SHOWN]],
+            leaves_ended=state.leaves_ended,
+            paused=run.paused,
+            waiting=not begun,
+        )
 
 
 def _leaf(state: State, story: NodeStory) -> RunningLeaf:

@@ -142,7 +142,8 @@ class JsonView(View):
         }
 
     def _write(self, data: dict[str, object]) -> None:
-        line = as_json(data, ascii_only=not _is_utf8(self._out))
+        encoding = (self._out.encoding or "").lower().replace("-", "")
+        line = as_json(data, ascii_only=encoding != "utf8")
         self._out.write(line + "\n")
         self._out.flush()
 
@@ -180,7 +181,3 @@ def plain(value: Value | Mapping[str, Value] | Status) -> Any:
 def _node(node: Node) -> dict[str, object]:
     told = {key: getattr(node, key) for key in ("id", "parent", "name", "kind")}
     return told | {"place": node.place or None}
-
-
-def _is_utf8(stream: TextIO) -> bool:
-    return (stream.encoding or "").lower().replace("-", "") == "utf8"

@@ -119,10 +119,9 @@ class LineView(View):
     def _attempt(self, event: AttemptEnded) -> None:
         action = self._state.action(event.node)
         if event.outcome is not Outcome.SUCCEEDED:
-            text = attempt_text(action, action.goals[event.goal_id])
+            text = _which(action, event) + attempt_text(action, action.goals[event.goal_id])
             again = f"; again in {event.again_in:.1f} s" if event.again_in else ""
-            said = f"{_which(action, event)}{text}{again}"
-            self._line(event.at.steady, "goal", event.node, said)
+            self._line(event.at.steady, "goal", event.node, text + again)
 
     def say(self, text: str) -> None:
         """Write `text` on a line of its own."""

@@ -110,8 +110,7 @@ class LiveView(View):
     def frame(self, now: float) -> None:
         """Draw."""
         self._let_by()
-        lines = self._lines(now)
-        self._live.update(Text("\n").join(lines), refresh=True)
+        self._live.update(Text("\n").join(self._lines(now)), refresh=True)
 
     def say(self, text: str) -> None:
         """Let `text` scroll by."""
@@ -126,9 +125,8 @@ class LiveView(View):
         colour = "yellow" if caused else _STYLES[state.status]
         for line in last_words(state, self._console.width):
             ending = line.startswith(("SUCCESS after", "FAILURE after", "STOPPED after"))
-            self._console.print(
-                Text(line, style=f"bold {colour}" if ending else ""), soft_wrap=True
-            )
+            style = f"bold {colour}" if ending else ""
+            self._console.print(Text(line, style=style), soft_wrap=True)
 
     def close(self) -> None:
         """Take the drawing away and give standard error back."""
@@ -151,15 +149,12 @@ class LiveView(View):
             self._console.print(Text("\n").join(lines), soft_wrap=True)
 
     def _finished(self, story: NodeStory) -> Text:
-        text = Text.assemble((self._glyph(story.status), _STYLES[story.status]), " ")
-        text.append(clean(self._state.called(story.node.id)))
-        if not story.node.server:
-            text.append(f"  {clean(story.message)}" if story.message else "", style="dim")
-        else:
+        name, said = clean(self._state.called(story.node.id)), clean(story.message)
+        if story.node.server:
             action = self._state.action(story.node.id)
-            text.append(f"  {action.server}  {clean(goal_text(action))}", style="dim")
-            text.append(f"  {action.duration:.2f} s", style="dim")
-        return text
+            said = f"{action.server}  {clean(goal_text(action))}  {action.duration:.2f} s"
+        glyph = self._glyph(story.status), _STYLES[story.status]
+        return Text.assemble(glyph, " ", name, (f"  {said}" if said else "", "dim"))
 
     def _lines(self, now: float) -> list[Text]:
         """The progress line, and as many nodes as there is room for."""
@@ -227,13 +222,12 @@ class LiveView(View):
         width = max(0, min(BAR, self._width - len(count + elapsed + keys)))
         filled = width * min(done, leaves) // leaves
         full, empty = ("=", "-") if self._plain else ("━", "─")
-        text = Text()
-        text.append(full * filled, style="green")
-        text.append(empty * (width - filled), style="dim")
-        text.append(count if width else count.lstrip())
-        text.append(elapsed, style="dim")
-        text.append(keys, style="dim")
-        return text
+        return Text.assemble(
+            (full * filled, "green"),
+            (empty * (width - filled), "dim"),
+            count if width else count.lstrip(),
+            (elapsed + keys, "dim"),
+        )
 
     def _glyph(self, status: Status) -> str:
         return _GLYPHS[status][self._plain]
