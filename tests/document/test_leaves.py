@@ -71,6 +71,20 @@ def test_a_service_that_does_not_answer_fails_in_time(load: Load, network: Virtu
     assert runner.now < 0.2
 
 
+def test_a_time_that_another_one_follows_is_not_told_as_what_is_left(
+    load: Load, network: VirtualNetwork
+) -> None:
+    runner = VirtualRunner(load(CALL.format(more="timeout: 9 s")), network)
+    runner.start()
+    runner.advance(0.5)
+    assert runner.state.nodes[1].due_in is None, "it waits for the service, then for the answer"
+    network.provide(SetBool, "switch", lambda _: SetBool.Response(success=True), takes=60.0)
+    runner = VirtualRunner(load(CALL.format(more="timeout: 9 s")), network)
+    runner.start()
+    runner.advance(0.5)
+    assert runner.state.nodes[1].due_in == 9.0
+
+
 NUMBERS = """
 tree: t
 outputs: {{n: int8}}

@@ -1,0 +1,35 @@
+"""A served run, as its server tells of it while it goes on."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+from unittest.mock import Mock
+
+import py_trees
+from py_trees.common import Status
+
+from bt_actions.serving.messages import feedback
+from bt_actions.serving.run import Run
+from tests.support.waiting import until
+
+
+def test_a_tick_that_does_not_return_is_told_in_the_feedback_while_it_lasts(node: Any) -> None:
+    class Stuck(py_trees.behaviours.Running):
+        def update(self) -> Status:
+            assert may_return.wait(30.0)
+            return Status.SUCCESS
+
+    may_return, outcomes = threading.Event(), list[Any]()
+    tree = Mock(build=lambda inputs: Stuck("Grasp"))
+    run = Run(tree, {}, node, begins=lambda servers: None, ended=outcomes.append)
+    run.start()
+
+    def told() -> list[tuple[str, str]]:
+        return [(each.path, each.message) for each in feedback(run, begun=True).running]
+
+    until(lambda: told() == [("Grasp", "in its tick")])
+    may_return.set()
+    assert run.join(9.0)
+    assert outcomes[0].code == 0
+    assert told() == []
