@@ -307,11 +307,12 @@ class Spinner:
 
 
 def node_beside(node: Node, name: str) -> Node:
-    """Return a new node in the same context; the caller destroys it.
+    """Return a new node in the same context and namespace; the caller destroys it.
 
     What `--ros-args` says is about the other one, whose name it may not get too.
     """
-    return Node(name, context=node.context, use_global_arguments=False)
+    namespace = node.get_namespace()
+    return Node(name, context=node.context, namespace=namespace, use_global_arguments=False)
 
 
 def _frames() -> Iterator[FrameType]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
 from py_trees.common import Status
+from robot_control_interfaces.action import MoveRobot
 from test_msgs.action import Fibonacci
 
 from bt_actions import load_tree
@@ -24,6 +25,7 @@ from bt_actions.testing import (
 )
 from tests.cli.conftest import Start
 from tests.cli.test_arguments import refused
+from tests.support.processes import Journal
 
 NIGHT = "examples/night/night.yaml"
 FOREIGN = """\
@@ -96,6 +98,27 @@ def test_servers_of_any_type_are_played_and_services_are_named(
         ["Again", "/counter", "1", "ABORTED"],
     ], run
     assert any("it has no server for /light (SetBool)" in line for line in run.errors), run
+
+
+def test_a_robot_of_the_same_name_nearby_is_not_asked(
+    start: Start,
+    robot: Callable[..., Journal],
+    namespace: str,
+    tree: Callable[..., Path],
+    tmp_path: Path,
+) -> None:
+    path, first = tree(), tmp_path / "first.mcap"
+    network = VirtualNetwork(namespace)
+    ScriptedServer(network, MoveRobot, "move_robot", faults=["move_robot:1:abort"])
+    runner = VirtualRunner(load_tree(path), network)
+    runner.run()
+    write(first, runner.events)
+
+    nearby = robot(speed=20.0)
+    run = start("run", str(path), "--sim-like", str(first), "--namespace", namespace)
+    assert run.wait() == 1, run
+    assert any("ABORTED: aborted by" in line for line in run.lines), run
+    assert nearby.count("received") == 0
 
 
 def test_a_file_that_is_no_recording_is_refused(start: Start, tmp_path: Path) -> None:

@@ -140,6 +140,13 @@ def test_speed_shortens_what_a_server_takes() -> None:
     assert times(runner.events) == pytest.approx([0.3], abs=0.05)
 
 
+def test_faults_are_added_to_what_was_recorded() -> None:
+    first = recorded(in_turn(move("A", 1.0), move("B", 1.0)), "1:reject")
+    tree = in_turn(move("A", 1.0), move("B", 1.0))
+    runner, _ = again(tree, first.events, faults=["move_robot:2:abort"])
+    assert runner.outcomes == [("A", Outcome.REJECTED), ("B", Outcome.ABORTED)]
+
+
 def test_a_server_of_any_action_type_is_played() -> None:
     def tree() -> Behaviour:
         return ActionBehaviour("F", Fibonacci, "fibonacci", {"order": 3}, timeout=5.0)
