@@ -337,9 +337,11 @@ class TestWhatIsNotKnown:
             replace(each, goal=HIDDEN) if isinstance(each, GoalChanged) and each.goal else each
             for each in first.events
         ]
-        runner, servers = again(move("A", 1.0), events)
-        assert (warnings(runner), runner.outcomes) == ([], first.outcomes)
+        runner, servers = again(in_sequence(move("A", 1.0), move("B", 2.0)), events)
+        assert runner.outcomes == [("A", Outcome.SUCCEEDED), ("B", Outcome.SUCCEEDED)]
         assert "1 of 1 goals" in servers.remarks[0]
+        [said] = warnings(runner)
+        assert said.startswith("/move_robot: goal 2 is beyond the 1 recorded")
 
     def test_of_a_value_that_was_cut_the_beginning_is_played(self) -> None:
         def tree() -> ActionBehaviour:

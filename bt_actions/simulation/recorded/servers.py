@@ -17,7 +17,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.events.kinds import Event
-from bt_actions.events.snapshot import Cut, Value, snapshot
+from bt_actions.events.snapshot import HIDDEN, Cut, Value, snapshot
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.messages.conversion import MessageError, fill
 from bt_actions.messages.interfaces import interface, short_name
@@ -91,6 +91,7 @@ class RecordedServer(ScriptedServer):
         self.left = list(goals)
         """Those that were not asked for again."""
         self.recorded = len(goals)
+        self._is_secret = any(each.goal == HIDDEN for each in goals)
         self._taken: dict[int, RecordedGoal] = {}
         """By the goal's message, from its request until it begins."""
         super().__init__(node, action_type, name, script, **settings)
@@ -106,7 +107,9 @@ class RecordedServer(ScriptedServer):
 
     def begin(self, goal: Any) -> Any:
         recorded = self._taken.pop(id(goal), None)
-        return super().begin(goal) if recorded is None else _Rerun(recorded, STEP)
+        if recorded is None:
+            return super().begin(goal)
+        return _Rerun(recorded, self.stepper.step_period)
 
     def due_feedback(self, motion: Any) -> Sequence[Any]:
         if not isinstance(motion, _Rerun):
@@ -139,7 +142,7 @@ class RecordedServer(ScriptedServer):
 
     def _take(self, told: Value, number: int) -> RecordedGoal | None:
         """Return the recorded goal that a new one is treated as, and say where they differ."""
-        new = f"{self.name}: goal {number}, {shorten(told)},"
+        new = f"{self.name}: goal {number}{'' if self._is_secret else f', {shorten(told)},'}"
         if not self.left:
             self._warn(f"{new} is beyond the {self.recorded} recorded: its answer is made up")
             return None
