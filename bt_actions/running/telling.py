@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import platform
 import sys
 import traceback
@@ -62,7 +63,8 @@ class TreeTeller(Teller):
 
     def begin(self) -> None:
         """Take note that a run begins, which is told of when its tree is set up."""
-        self.run_id, self._has_begun = self._host.new_goal_id().hex(), False
+        unlike = hashlib.blake2b(self._host.new_goal_id(), digest_size=16)
+        self.run_id, self._has_begun = unlike.hexdigest(), False  # by its first letters, too
         self._overhears = self.is_heard
         if self._overhears:
             overhear()

@@ -35,6 +35,8 @@ from bt_actions.goals.policy import Busy
 from bt_actions.story.state import State
 from bt_actions.story.why import why
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
+from bt_actions.testing.host import VirtualHost
+from bt_actions.utilities.ids import new_id
 from tests.support.trees import in_sequence
 
 
@@ -569,3 +571,14 @@ class TestSecretsInWords:
         runner.run()
         lines = [to_line(event) for event in runner.events if not isinstance(event, RunBegan)]
         assert not [line for line in lines if "hunter2" in line]
+
+
+def test_ids_of_runs_differ_in_their_first_letters(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ids of goals begin with what all goals of a machine have in common."""
+    monkeypatch.setattr(VirtualHost, "new_goal_id", lambda _: new_id())
+    runner = VirtualRunner(Does("D", lambda tick: None), VirtualNetwork())
+    runner.run()
+    runner.run()
+    ids = [event.run_id for event in events_of(runner, RunBegan)]
+    assert [len(bytes.fromhex(each)) for each in ids] == [16, 16]
+    assert len({each[:8] for each in ids}) == 2
