@@ -20,9 +20,11 @@ from functools import lru_cache
 from typing import Any
 
 from bt_actions.events import kinds
-from bt_actions.events.kinds import Event
+from bt_actions.events.kinds import Event, Moment
 from bt_actions.events.snapshot import Cut
 
+_LATEST = 1e11
+"""Seconds of any clock, at most: a date of it can be written, and a difference taken."""
 _EXACT = 2**53
 """Up to which every reader of JSON has whole numbers exactly."""
 KINDS: dict[str, type[Event]] = {
@@ -136,9 +138,8 @@ def reader_of(hint: Any) -> Reader:
         return lambda data: None if data is None else read(data)
     if isinstance(hint, type) and issubclass(hint, enum.Enum):
         return hint
-    if isinstance(hint, type) and issubclass(hint, tuple) and hasattr(hint, "_fields"):
-        readers = [reader_of(each) for each in typing.get_type_hints(hint).values()]
-        return lambda data: hint(*(read(each) for read, each in zip(readers, data, strict=True)))
+    if hint is Moment:
+        return _moment
     if isinstance(hint, type) and dataclasses.is_dataclass(hint):
         fields = _readers(hint)
         return lambda data: hint(**{name: fields[name](each) for name, each in data.items()})
@@ -150,6 +151,14 @@ def reader_of(hint: Any) -> Reader:
     if hint in (bool, int, float, str):
         return lambda data: _plain(data, hint)
     return _value
+
+
+def _moment(data: Any) -> Moment:
+    number, *clocks = data
+    at = Moment(_plain(number, int), *(_plain(each, float) for each in clocks))
+    if not all(abs(each) < _LATEST for each in at[1:]):
+        raise WireError("no clock can show that moment")
+    return at
 
 
 def _plain(data: Any, wanted: type) -> Any:

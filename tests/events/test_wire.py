@@ -58,7 +58,10 @@ def of(hint: Any) -> st.SearchStrategy[Any]:
         return st.lists(of(inner[0]), max_size=3).map(tuple)
     if issubclass(hint, enum.Enum):
         return st.sampled_from(hint)
-    if dataclasses.is_dataclass(hint) or issubclass(hint, tuple):
+    if hint is Moment:
+        clock = st.floats(-1e10, 1e10)
+        return st.builds(Moment, st.integers(0, 2**40), clock, clock, clock)
+    if dataclasses.is_dataclass(hint):
         fields = typing.get_type_hints(hint)
         return st.builds(hint, **{name: of(each) for name, each in fields.items()})
     return {bool: st.booleans(), int: st.integers() | NUMBERS, float: st.floats(), str: TEXTS}[hint]
@@ -104,6 +107,16 @@ def test_what_json_cannot_say_stands_behind_a_dollar_sign() -> None:
 
 
 # Hostile lines
+
+
+@pytest.mark.parametrize("clock", [1, 2, 3])
+@pytest.mark.parametrize("seconds", [float("nan"), float("inf"), -1e300])
+def test_a_moment_that_no_clock_shows_is_none(clock: int, seconds: float) -> None:
+    at = list(AT)
+    at[clock] = seconds
+    with pytest.raises(WireError, match="no clock"):
+        from_line(to_line(Paused(Moment(*at), True)))
+
 
 NODES = (Node(1, None, "root", "sequence"), Node(2, 1, "Move", "move", settings={"attempts": 3}))
 LINE = to_line(RunBegan(AT, "0" * 32, "t", NODES, {"x": (1, 2.5)}, {"t.yaml": "tree: t"}, {}))
