@@ -135,13 +135,23 @@ def read_summary(first: Path) -> Summary | None:
             for name in ("run_id", "tree", "request", "status", "stopped_by", "cause")
         }
         code, seconds = data.get("exit_code"), data.get("seconds")
+        began = float(data["began"])
+        time.localtime(began)  # raises where no clock can show that
         return Summary(
             **text,
-            began=float(data["began"]),
+            began=began,
             exit_code=None if code is None else int(code),
             seconds=None if seconds is None else float(seconds),
         )
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+    except (
+        OSError,
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        ArithmeticError,
+        RecursionError,
+    ):
         return None
 
 

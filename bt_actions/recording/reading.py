@@ -16,7 +16,9 @@ from py_trees.common import Status
 from bt_actions.events import (
     Event,
     EventsLost,
+    GoalChanged,
     Moment,
+    Node,
     NodeChanged,
     NodesAdded,
     RunBegan,
@@ -43,7 +45,9 @@ from bt_actions.story.keeping import from_json
 from bt_actions.story.state import State
 
 MOST_NAMES = 1_000_000
-"""Nodes, variables and servers of one run that are read."""
+"""Nodes, variables, servers and goals of one run that are read."""
+MOST_BYTES = 100_000_000
+"""Of all tree files and other attachments."""
 _STATUS = {number: status for status, number in STATUSES.items()}
 _BY_NUMBER = {number: LAYOUTS[topic] for topic, number in CHANNELS.items()}
 _BY_TYPE = {layout.type: layout for layout in LAYOUTS.values()}
@@ -80,8 +84,11 @@ class Recording:
         self._base: int | None = None
         """Nanoseconds by which the log's time is ahead of the steady clock."""
         self._names: set[str] = set()
+        self._nodes = self._node = 0
+        """How many there were, and the highest number of one."""
+        self._attachments = 0
+        """Bytes."""
         self.begin_part()
-        self._nodes = 0
 
     def state(self) -> State:
         """Return how the run stands at the end of what is recorded. Raises RecordingError."""
@@ -135,6 +142,10 @@ class Recording:
     # Within
 
     def _attached(self, attachment: Attachment) -> None:
+        self._attachments += len(attachment.data)
+        if self._attachments > MOST_BYTES:
+            self.damaged += 1
+            return
         path = attachment.name.removeprefix("trees/")
         if path != attachment.name:
             self.sources[path] = attachment.data.decode("utf-8", "replace")
@@ -164,9 +175,23 @@ class Recording:
         self._base = log_time - nanoseconds(event.at.steady)
         self._number = event.at.number
         if isinstance(event, RunBegan):
+            self._node = 0
+        if isinstance(event, RunBegan | NodesAdded):
+            self._number_nodes(event.nodes)
+        if isinstance(event, RunBegan):
             self._run_id = event.run_id if event.run_id == run_id else ""
             event = replace(event, sources=dict(self.sources))
         yield event
+
+    def _number_nodes(self, nodes: tuple[Node, ...]) -> None:
+        """Refuse nodes that are no tree: numbers grow, and parents come before their children."""
+        for node in nodes:
+            is_above = self._node < node.id and (node.parent or 0) < node.id
+            if not is_above or not 0 <= (node.index or 0) < node.id:
+                raise WireError("no tree")
+            self._node = node.id
+        if not self._node:
+            raise WireError("a tree has nodes")
 
     def _transition(self, message: Message, head: tuple[object, ...]) -> Iterator[Item]:
         number, seconds, rest, node, status, by_itself = head
@@ -184,7 +209,7 @@ class Recording:
         if state.now is None or state.now.number <= self._number:
             return
         lost = state.now.number - self._number
-        self._number = state.now.number
+        self._number, self._node = state.now.number, max(state.nodes)
         self._base = log_time - nanoseconds(state.now.steady)
         self._run_id = state.began.run_id if state.began is not None else ""
         yield EventsLost(state.now, lost)
@@ -196,6 +221,8 @@ class Recording:
             self._names.add(item.name)
         elif isinstance(item, ServerSeen):
             self._names.add(item.server)
+        elif isinstance(item, GoalChanged):
+            self._names.add(item.goal_id)
         elif isinstance(item, NodesAdded):
             self._nodes += len(item.nodes)
         if len(self._names) + self._nodes > MOST_NAMES:

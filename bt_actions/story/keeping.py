@@ -26,6 +26,15 @@ _OWN = (RunBegan, State, NodeStory, Warned)
 """Kinds that hold shared objects, and are written field by field."""
 _MADE_ANEW = "_called"
 """The field of a state that follows from the others."""
+_NO_STATE = (
+    LookupError,
+    TypeError,
+    ValueError,
+    AttributeError,
+    ArithmeticError,
+    RecursionError,
+)
+"""What a text raises that is no state."""
 _Writer = Callable[[Any, "_Objects"], Any]
 _Reader = Callable[[Any, list[Any]], Any]
 
@@ -46,11 +55,28 @@ def from_json(text: str) -> State:
         for name, fields in data["objects"]:
             objects.append(_fields(_SHARED[name])[1](fields, objects))
         state: State = _codec(State)[1](data["state"], objects)
-    except (LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
+    except _NO_STATE as error:
         raise WireError(f"no state: {type(error).__name__} {error}") from error
-    if state.began is None or state.root not in state.nodes:
-        raise WireError("no state: its nodes are missing")
+    if state.began is None or state.root not in state.nodes or not _is_tree(state.nodes):
+        raise WireError("no state: its nodes are no tree")
+    named = state._names.keys()  # noqa: SLF001 - the fields of a state are all that is kept
+    if not named >= {*state.nodes, *(each.node.id for each in state.actions)}:
+        raise WireError("no state: nodes have no names")
     return state
+
+
+def _is_tree(nodes: dict[int, NodeStory]) -> bool:
+    """Whether all nodes below one have higher numbers, and are below no other one."""
+    return all(
+        number == story.node.id
+        and (story.node.parent or 0) < number
+        and len(set(story.children)) == len(story.children)
+        and all(
+            each > number and each in nodes and nodes[each].node.parent == number
+            for each in story.children
+        )
+        for number, story in nodes.items()
+    )
 
 
 class _Objects:

@@ -217,8 +217,8 @@ class State:
 
     def _remove(self, nodes: tuple[int, ...]) -> None:
         for number in nodes:
-            story = self.nodes.pop(number)
-            if story.node.parent in self.nodes:
+            story = self.nodes.pop(number, None)
+            if story is not None and story.node.parent in self.nodes:
                 self.nodes[story.node.parent].children.remove(number)
         self._called.clear()
 
@@ -293,7 +293,7 @@ class State:
             story.pending = []
 
     def _deal_with(self, failures: list[Failure], by: int | None) -> None:
-        if by is None or self.nodes[by].node.kind == "invert":  # to which it is no failure
+        if by not in self.nodes or self.nodes[by].node.kind == "invert":  # to which it is none
             return
         for failure in failures:
             failure.by = self.nodes[by].node
