@@ -30,8 +30,9 @@ from bt_actions.recording.folders import (
 )
 from bt_actions.recording.writing import RunWriter
 from bt_actions.story.state import State
-from bt_actions.story.why import why
+from bt_actions.story.why import attempt_text
 from bt_actions.utilities.plain_text import clean
+from bt_actions.utilities.shorten import fit
 
 BATCH = 0.05
 """Seconds for which events gather before they are written."""
@@ -208,8 +209,6 @@ def summary(state: State) -> Summary:
     began, finished, ended = state.began, state.finished, state.ended
     assert began is not None
     over = finished is not None or ended is not None
-    lines = why(state) if over and state.status is not Status.SUCCESS else []
-    error = ended.error if ended is not None else ""
     return Summary(
         began.run_id,
         began.tree,
@@ -219,5 +218,17 @@ def summary(state: State) -> Summary:
         stopped_by=state.stop.who if state.stop is not None else "",
         exit_code=ended.exit_code if ended is not None else None,
         seconds=state.elapsed,
-        cause=clean(" ".join(line.strip() for line in lines[:2]) or error),
+        cause=clean(fit(_cause(state))) if over and state.status is not Status.SUCCESS else "",
     )
+
+
+def _cause(state: State) -> str:
+    """Why a run has not succeeded, on one line that begins with a node's name."""
+    if state.finished is not None and state.finished.error:
+        return state.finished.error
+    for failure in (*state.failures, *state.stopped):
+        said, action = failure.message, failure.action
+        if action is not None and failure.attempts:
+            said = attempt_text(action, failure.attempts[-1])
+        return f"{failure.path[-1]}: {said}" if said else failure.path[-1]
+    return state.ended.error if state.ended is not None else ""
