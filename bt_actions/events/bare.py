@@ -1,7 +1,7 @@
 """Events without the values that a robot moved by: for those who may know the story alone.
 
 What stays is which node did what, when, and with which outcome. Goals, results, feedback,
-variables, items, inputs and outputs go, and of each text what may hold values: see `_said`.
+variables, items, inputs and outputs go, and of each text what may hold values: see `said`.
 """
 
 from __future__ import annotations
@@ -37,13 +37,14 @@ def bare(event: Event) -> Event | None:
     return event if strip is None else strip(event)
 
 
-def _said(text: str) -> str:
-    """A text up to its first value: what a server or a node of the user's says is all value."""
+def said(text: str) -> str:
+    """Return a text up to its first value; all that a server or a user's node says is value."""
     head = text.partition("{")[0]
-    return head.partition(": ")[0].rstrip(" ;,:")
+    return head.partition(": ")[0].rstrip(" ;,:").removesuffix("; goal")
 
 
-def _node(node: Node) -> Node:
+def bare_node(node: Node) -> Node:
+    """Return a node with those of its policies alone that are no values of the robot's."""
     kept = {name: each for name, each in node.settings.items() if name in _SETTINGS}
     return replace(node, settings=kept)
 
@@ -53,26 +54,24 @@ def _hidden(values: Any) -> dict[str, Any]:
 
 
 def _goal(event: GoalChanged) -> GoalChanged:
-    return replace(event, goal=None, result=None, reason=_said(event.reason))
+    return replace(event, goal=None, result=None, reason=said(event.reason))
 
 
 def _finished(event: TreeFinished) -> TreeFinished:
-    left = tuple(replace(each, fields="", reason=_said(each.reason)) for each in event.unaccounted)
-    return replace(
-        event, outputs=_hidden(event.outputs), error=_said(event.error), unaccounted=left
-    )
+    left = tuple(replace(each, fields="", reason=said(each.reason)) for each in event.unaccounted)
+    return replace(event, outputs=_hidden(event.outputs), error=said(event.error), unaccounted=left)
 
 
 _STRIPPED: dict[type[Event], Callable[[Any], Event | None]] = {
     RunBegan: lambda event: replace(
-        event, nodes=tuple(map(_node, event.nodes)), inputs=_hidden(event.inputs), sources={}
+        event, nodes=tuple(map(bare_node, event.nodes)), inputs=_hidden(event.inputs), sources={}
     ),
-    NodesAdded: lambda event: replace(event, nodes=tuple(map(_node, event.nodes))),
+    NodesAdded: lambda event: replace(event, nodes=tuple(map(bare_node, event.nodes))),
     NodeChanged: lambda event: replace(
-        event, message=_said(event.message), warning=_said(event.warning)
+        event, message=said(event.message), warning=said(event.warning)
     ),
     GoalChanged: _goal,
-    AttemptEnded: lambda event: replace(event, reason=_said(event.reason), seen={}),
+    AttemptEnded: lambda event: replace(event, reason=said(event.reason), seen={}),
     FeedbackCame: lambda event: None,
     VariableWritten: lambda event: None,
     RoundBegan: lambda event: replace(event, item=None),
@@ -81,8 +80,8 @@ _STRIPPED: dict[type[Event], Callable[[Any], Event | None]] = {
     RunEnded: lambda event: replace(
         event,
         world="",
-        complaint=_said(event.complaint),
-        error=_said(event.error),
-        unaccounted=tuple(map(_said, event.unaccounted)),
+        complaint=said(event.complaint),
+        error=said(event.error),
+        unaccounted=tuple(map(said, event.unaccounted)),
     ),
 }

@@ -1,0 +1,58 @@
+"""A state without the values that a robot moved by, as events/bare.py strips events of them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import deque
+from typing import Any
+
+from bt_actions.events.bare import bare, bare_node, said
+from bt_actions.events.kinds import Event, Moment, Node
+from bt_actions.story.state import State
+
+_TEXTS = ("message", "warning", "reason")
+"""Fields of a state's parts that may hold values behind their first words."""
+_VALUES = ("goal", "result")
+
+
+def stripped(state: State) -> State:
+    """Return a state that tells as much as it would if it had seen bare events alone."""
+    found: State = _Stripping().of(state)
+    return found
+
+
+class _Stripping:
+    """What several places of a state hold stays one object."""
+
+    def __init__(self) -> None:
+        self._done: dict[int, tuple[object, Any]] = {}
+        """By id the object, which so lives on, and what became of it."""
+
+    def of(self, held: Any) -> Any:
+        if id(held) not in self._done:
+            self._done[id(held)] = held, self._new(held)
+        return self._done[id(held)][1]
+
+    def _new(self, held: Any) -> Any:
+        if isinstance(held, Moment):
+            return held
+        if isinstance(held, Event):
+            return bare(held)
+        if isinstance(held, Node):
+            return bare_node(held)
+        if isinstance(held, dict):
+            return {key: new for key, each in held.items() if (new := self.of(each)) is not None}
+        if isinstance(held, deque):
+            return deque(map(self.of, held), held.maxlen)
+        if isinstance(held, list | tuple):
+            return type(held)(map(self.of, held))
+        if not dataclasses.is_dataclass(held):
+            return held
+        new = dict[str, Any]()
+        for each in dataclasses.fields(held):
+            value = getattr(held, each.name)
+            if each.name in _TEXTS:
+                new[each.name] = said(value)
+            else:
+                new[each.name] = None if each.name in _VALUES else self.of(value)
+        return dataclasses.replace(held, **new)  # type: ignore[type-var]  # an object, no class

@@ -1,0 +1,191 @@
+"""A recording is anybody's file: a report of it is a text, or an error in words."""
+
+from __future__ import annotations
+
+import copy
+import json
+import random
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.writer import Writer
+
+from bt_actions.cli.commands.report import data
+from bt_actions.events import to_line
+from bt_actions.recording.layout import EVENTS, LAYOUTS, STATE, encode
+from bt_actions.recording.reading import RecordingError
+from bt_actions.recording.report import markdown, reports, text
+from bt_actions.recording.writing import CHANNELS
+from bt_actions.story.keeping import to_json
+from bt_actions.utilities.plain_text import as_json
+from tests.support.every_kind import every_kind
+from tests.support.recordings import record
+from tests.support.stories import state_of
+
+EXTREMES: tuple[Any, ...] = (
+    None, True, -1, 0, 1, 2, 99, 2**63, 10**400, -0.5, 1e300, {"$float": "nan"}, {"$float": "inf"},
+    {"$int": "9" * 400}, "", "x", "\x1b[31m\u202e\ud800\n```", "INVALID", "SUCCESS", "DONE",
+    "RunTree", [], [1], {}, {"$cut": ["head", 3]},
+    {"$cut": [None, {"$float": "inf"}]}, {"$bytes": "!"},
+    [[[[[[]]]]]], "x" * 10_000,
+)  # fmt: skip
+
+
+def raw(path: Path, texts: Iterable[str], state: str = "", name: str = "") -> Path:
+    """Write texts as if they were events, behind a state, and an attachment of a name."""
+    with path.open("wb") as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start(profile="ros2", library="tests")
+        for layout in LAYOUTS.values():
+            schema = writer.register_schema(layout.type, "ros2msg", b"")
+            writer.register_channel("/x", "cdr", schema)
+        if name:
+            writer.add_attachment(0, 0, name, "application/yaml", b"tree: mine\n")
+        run = bytes(range(16))
+        if state:
+            message = encode(LAYOUTS[STATE], (run, 1, 0, 0), ("all", state))
+            writer.add_message(CHANNELS[STATE], 0, message, 0)
+        for text in texts:
+            message = encode(LAYOUTS[EVENTS], (run, 1, 0, 0, 0, 0), ("Kind", text))
+            writer.add_message(CHANNELS[EVENTS], 0, message, 0)
+        writer.finish()
+    return path
+
+
+def whole(first: Path) -> str:
+    """All forms of the report of a file, or the error in words."""
+    try:
+        found = reports(first)
+        lines = [*text(found), *markdown(found), *text(found, full=True)]
+        return "\n".join([*lines, as_json([data(each, full=True) for each in found])])
+    except RecordingError as error:
+        return str(error)
+
+
+def changed(plain: Any, chance: random.Random) -> Any:
+    """Plain data with an extreme value somewhere in it."""
+    plain = copy.deepcopy(plain)
+    at, places = plain, list[tuple[Any, Any]]()
+    waiting = [at]
+    while waiting:
+        at = waiting.pop()
+        keys = list(at) if isinstance(at, dict) else range(len(at))
+        places += [(at, key) for key in keys]
+        waiting += [at[key] for key in keys if isinstance(at[key], dict | list)]
+    for _ in range(chance.randrange(1, 4)):
+        holder, key = chance.choice(places)
+        holder[key] = copy.deepcopy(chance.choice(EXTREMES))
+    return plain
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_no_event_makes_more_than_an_error_in_words(tmp_path: Path, seed: int) -> None:
+    chance = random.Random(seed)
+    plain = [json.loads(to_line(event)) for event in every_kind(rounds=2)]
+    said = 0
+    for _ in range(40):
+        texts = [
+            json.dumps(changed(each, chance) if chance.random() < 0.2 else each) for each in plain
+        ]
+        said += whole(raw(tmp_path / "run.mcap", texts)).startswith("all: ")
+    assert said > 10, "most of them have a report"
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_no_state_makes_more_than_an_error_in_words(tmp_path: Path, seed: int) -> None:
+    chance, events = random.Random(seed), every_kind(rounds=2)
+    middle = len(events) // 2
+    plain = json.loads(to_json(state_of(events[:middle])))
+    texts = [to_line(event) for event in events[middle:]]
+    for _ in range(60):
+        state = json.dumps(changed(plain, chance))
+        assert whole(raw(tmp_path / "run.mcap", texts, state))
+
+
+@pytest.mark.parametrize(
+    "nodes",
+    [
+        [],
+        [[1, 1]],
+        [[1, 2], [2, 1]],
+        [[1, None], [2, 1], [2, 1]],
+        [[2, None], [1, 2]],
+        [[1, None], [2, 3], [3, 2]],
+    ],
+    ids=["none", "own parent", "circle", "twice", "backwards", "circle below"],
+)
+def test_nodes_that_are_no_tree_are_no_run(tmp_path: Path, nodes: list[list[int | None]]) -> None:
+    server, began, *rest = (json.loads(to_line(event)) for event in every_kind())
+    node = began["nodes"][0]
+    began["nodes"] = [node | {"id": own, "parent": parent} for own, parent in nodes]
+    path = raw(tmp_path / "run.mcap", map(json.dumps, [server, began, *rest]))
+    assert "holds no run" in whole(path)
+
+
+def test_a_run_of_another_version_is_said_to_be_one(tmp_path: Path) -> None:
+    plain = [json.loads(to_line(event)) for event in every_kind()]
+    plain[1]["colour"] = "red"
+    path = raw(tmp_path / "run.mcap", map(json.dumps, plain))
+    assert whole(path) == f"{path} holds no run: 1 messages in it cannot be read by this version"
+    del plain[1]["colour"]
+    plain[4]["kind"] = "Flew"
+    said = whole(raw(path, map(json.dumps, plain)))
+    assert said.startswith("all: STOPPED after ")
+    assert "\n  1 damaged messages were passed over; 7 events are missing\n" in said
+
+
+def test_a_file_that_is_cut_has_a_report_of_what_is_left(tmp_path: Path) -> None:
+    first = record(every_kind(rounds=50), tmp_path, killed=0.0)
+    data = first.read_bytes()
+    for part in range(1, 20):
+        first.write_bytes(data[: len(data) * part // 20])
+        said = whole(first)
+        assert said.startswith("all: never finished\n") or "holds no run" in said
+    assert said.startswith("all: never finished\n")
+
+
+NASTY = "\x1b[31mred\x9b\u202e\n```\n# head <img src=x> `code`"
+
+
+def test_names_of_strangers_are_shown_as_text_and_no_more(tmp_path: Path) -> None:
+    plain = [json.loads(to_line(event)) for event in every_kind()]
+    for node in plain[1]["nodes"]:
+        node["name"] = node["place"] = NASTY
+    plain[1]["tree"] = plain[1]["caller"] = NASTY
+    plain[1]["inputs"] = plain[1]["versions"] = {NASTY: NASTY}
+    for each in plain:
+        each |= {key: NASTY for key in ("reason", "text", "why", "error") if key in each}
+    path = raw(tmp_path / "run.mcap", map(json.dumps, plain), name=f"trees/{NASTY}")
+    found = reports(path)
+    for line in (*text(found), *markdown(found)):
+        assert line.isprintable(), line
+
+
+def test_no_name_ends_what_markdown_shows_as_text(tmp_path: Path) -> None:
+    plain = [json.loads(to_line(event)) for event in every_kind()]
+    for node in plain[1]["nodes"]:
+        node["name"] = "```\n<img src=x>\n`"
+    plain[1]["tree"] = "` <img src=x> `"
+    lines = list(markdown(reports(raw(tmp_path / "run.mcap", map(json.dumps, plain)))))
+    assert lines[0].startswith("# `' <img src=x> ': STOPPED after ")
+    assert [line for line in lines if "```" in line] == ["```text", "```"] * 4
+
+
+@pytest.mark.parametrize("name", ["trees/../../escaped.yaml", "/tmp/escaped.yaml", "../escaped"])
+def test_an_attachment_is_written_nowhere(
+    tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from bt_actions.cli import main
+
+    folder = tmp_path / "a" / "b"
+    folder.mkdir(parents=True)
+    monkeypatch.chdir(folder)
+    raw(folder / "run.mcap", map(to_line, every_kind()), name=name)
+    before = sorted(tmp_path.rglob("*"))
+    assert main(["report", "run.mcap", "-o", "x.md"]) == 0
+    assert main(["report", "./run.mcap"]) == 0
+    assert capsys.readouterr().out.startswith("all: ")
+    assert sorted(tmp_path.rglob("*")) == sorted([*before, folder / "x.md"])
+    assert not Path("/tmp/escaped.yaml").exists()
