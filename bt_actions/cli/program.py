@@ -26,6 +26,8 @@ COMMANDS = {
     "list": "list_trees",
     "call": "call",
     "control": "control",
+    "runs": "runs",
+    "report": "report",
     "sim": "sim",
     "cleanup": "cleanup",
     "check": "check",

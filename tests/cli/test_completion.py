@@ -6,11 +6,15 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from py_trees.common import Status
 
 from bt_actions.cli.program import COMMANDS
+from tests.support.recordings import record
+from tests.support.told_trees import FakeNode, Story
 
 CHECKOUT = Path(__file__).parents[2]
 PATH = {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
@@ -43,7 +47,7 @@ pytestmark = pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash
 @pytest.mark.parametrize(
     ("line", "offered"),
     [
-        ("re", ["render"]),
+        ("ren", ["render"]),
         ("", ["-h", "--help", "--version", *COMMANDS]),
         ("run --exec", ["--executor"]),
         ("run --executor m", ["multi"]),
@@ -81,8 +85,19 @@ def test_a_tree_that_cannot_be_read_is_not_offered(
     assert bash_completes("run pick") == ["pick_and_place"]
 
 
-@pytest.mark.parametrize("line", ["", "run ", "run pick_and_place --set ", "explain "])
+def test_bash_completes_runs_by_id_and_by_tree() -> None:
+    for letter in "ab":
+        story = Story(FakeNode("deliver"))
+        story.began = replace(story.began, run_id=letter * 32)
+        record([story.began, story.finish(Status.SUCCESS)])
+    assert sorted(bash_completes("report ")) == ["aaaaaaaa", "bbbbbbbb", "deliver"]
+    assert bash_completes("report b") == ["bbbbbbbb"]
+
+
+@pytest.mark.parametrize("line", ["", "run ", "run pick_and_place --set ", "explain ", "report "])
 def test_an_answer_waits_for_nothing_slow(line: str) -> None:
+    story = Story(FakeNode("deliver"))
+    record([story.began])
     line = f"bt-actions {line}"
     asked = {"_ARGCOMPLETE": "1", "COMP_LINE": line, "COMP_POINT": str(len(line))}
     done = subprocess.run(

@@ -74,5 +74,20 @@ def _faults(prefix: str, **_others: object) -> dict[str, str]:
     return {f"{server}:": kind for kind, server in SERVED.items()}
 
 
-_VALUES = {"TREE": _trees, "NAME=VALUE": _inputs, "CODE": _rules, "SPEC": _faults}
+def _runs(prefix: str, **_others: object) -> dict[str, str]:
+    from bt_actions.recording.folders import recorded
+
+    runs = [each.summary for each in recorded()]
+    ids = {each.run_id[:8]: each.tree for each in runs}
+    files = dict.fromkeys(FilesCompleter()(prefix), "") if "/" in prefix else {}
+    return ids | dict.fromkeys(ids.values(), "its last run") | files
+
+
+_VALUES = {
+    "TREE": _trees,
+    "NAME=VALUE": _inputs,
+    "CODE": _rules,
+    "SPEC": _faults,
+    "RUN": _runs,
+}
 """By the words that stand for values in help."""

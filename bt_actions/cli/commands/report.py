@@ -1,0 +1,154 @@
+"""`bt-actions report`: why a recorded run ended as it did, on the terminal or in a file."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bt_actions.cli.exits import BadInput, Exit
+from bt_actions.cli.streams.results import results
+from bt_actions.cli.streams.writing import columns, write
+
+if TYPE_CHECKING:
+    from bt_actions.cli.arguments.parser import Subparsers
+    from bt_actions.recording.report import Report
+
+_EPILOG = """\
+examples:
+  bt-actions report                              # the last run
+  bt-actions report 96399112                     # the first letters of an id: `bt-actions runs`
+  bt-actions report pick_and_place --full        # the last run of a tree, each line of it
+  bt-actions report monday.mcap -o monday.md
+  bt-actions report -o issue.md --no-values      # for others: no goal, result, input or variable
+
+Runs below a RunTree leaf that failed are told behind it, as far as they are recorded here.
+"""
+_FORMS = (".md", ".json")
+
+
+def add_parser(subparsers: Subparsers) -> None:
+    """Add the command's parser."""
+    parser = subparsers.add_parser(
+        "report",
+        help="tell why a recorded run failed, and all that it did",
+        description="Tell a recorded run: why it failed, its actions, and what happened when.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument(
+        "run",
+        metavar="RUN",
+        nargs="?",
+        default="",
+        help="first letters of an id, name of a tree, .mcap file, or folder of a bag [the last]",
+    )
+    parser.add_argument("--full", action="store_true", help="all lines, however long the run was")
+    parser.add_argument(
+        "--no-values",
+        dest="values",
+        action="store_false",
+        help="without goals, results, inputs, variables, items and what the tree logs",
+    )
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, help="file to write: .md or .json"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read the run, and tell it."""
+    if args.output is not None and args.output.suffix not in _FORMS:
+        raise BadInput(f"-o {args.output}: a report is written as .md or .json")
+    from bt_actions.recording import report
+    from bt_actions.recording.folders import NoRun, find
+    from bt_actions.recording.reading import RecordingError
+
+    try:
+        first = find(args.run)
+        _finish(first)
+        found = report.reports(first, values=args.values)
+        for _ in range(report.LEVELS):
+            above = None if args.run else report.caller_of(found[0])
+            if above is not None:  # the last run is the one that a person has begun
+                found = report.reports(above, values=args.values)
+        if args.output is not None:
+            _write(args.output, found, full=args.full)
+        else:
+            for line in report.text(found, full=args.full, width=columns(results()) - 2):
+                write(f"{line}\n")
+    except (NoRun, RecordingError) as error:
+        raise BadInput(str(error)) from error
+    except RecursionError as error:
+        raise BadInput(f"{first} holds values within values without an end") from error
+    return Exit.SUCCESS
+
+
+def _finish(first: Path) -> None:
+    """Finish a recording of ours that a killed process left, and no bag of others."""
+    from bt_actions.recording.finishing import finish
+    from bt_actions.recording.folders import read_summary
+
+    with contextlib.suppress(OSError):  # a folder that cannot be written
+        if read_summary(first) is not None:
+            finish(first)
+
+
+def _write(path: Path, found: list[Report], *, full: bool) -> None:
+    from bt_actions.recording.report import markdown
+    from bt_actions.utilities.plain_text import as_json
+    from bt_actions.utilities.whole_file import replace_file
+
+    if path.suffix == ".md":
+        text = "".join(f"{line}\n" for line in markdown(found, full=full))
+    else:
+        text = as_json({"runs": [data(each, full=full) for each in found]}, ascii_only=True) + "\n"
+    try:
+        replace_file(path, text.encode())
+    except OSError as error:
+        raise BadInput(f"{path} cannot be written: {error.strerror}") from error
+
+
+def data(report: Report, *, full: bool) -> dict[str, object]:
+    """Return a report as plain data; docs/recording.md tells what its keys are."""
+    from bt_actions.cli.views.json_lines import action_data, plain
+    from bt_actions.recording.timeline import Line
+    from bt_actions.story.why import why
+
+    state, recording = report.state, report.recording
+    began, ended = state.began, state.ended
+    assert began is not None
+    lines = [each for each in report.lines(full=full) if isinstance(each, Line)]
+    return {
+        "run": began.run_id,
+        "tree": began.tree,
+        "below": report.leaf or None,
+        "goal": began.request or None,
+        "caller": began.caller or None,
+        "began": began.at.wall,
+        "seconds": round(state.elapsed, 3),
+        "goes_on": report.goes_on,
+        "status": state.status.value if report.is_over else None,
+        "exit_code": ended.exit_code if ended is not None else None,
+        "lived": round(report.lived, 3),
+        "tick": recording.tick,
+        "inputs": plain(began.inputs),
+        "outputs": plain(state.outputs),
+        "versions": dict(began.versions),
+        "files": sorted(recording.sources),
+        "why": why(state, state.started + report.lived),
+        "actions": [action_data(each, state.latest) for each in state.actions],
+        "damaged": recording.damaged,
+        "lost": report.lost,
+        "left_out": 0 if full else report.left_out,
+        "timeline": [
+            {
+                "seconds": round(each.seconds, 4),
+                "wall": each.at.wall,
+                "kind": each.kind,
+                "text": each.text,
+                "id": each.node,
+                "path": list(each.path),
+            }
+            for each in lines
+        ],
+    }
