@@ -31,11 +31,10 @@ from bt_actions.recording.folders import (
 from bt_actions.recording.writing import RunWriter
 from bt_actions.story.state import State
 from bt_actions.story.why import attempt_text
+from bt_actions.utilities.batches import Batches
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import fit
 
-BATCH = 0.05
-"""Seconds for which events gather before they are written."""
 BEAT = 1.0
 """Seconds between two heartbeats of a run."""
 PATIENCE = 5.0
@@ -61,50 +60,35 @@ class Recorder:
         """`say` is given, on the recorder's thread, what a user should know of a recording."""
         self._wish, self._say = wish, say
         self._runs: list[_Run] = []
-        self._news = threading.Event()
         self._lock = threading.Lock()
-        self._closing = False
-        self._thread: threading.Thread | None = None
+        self._batches = Batches("recorder", self._step)
+        self._pruned = wish.first is not None
 
     def record(self, stream: Stream, tick: Callable[[], float | None]) -> _Run:
         """Record what happens from now on in a run, until its RunEnded.
 
         `tick` returns when the present tick began, on the steady clock; None between two ticks.
         """
-        run = _Run(stream, stream.reader(self._news.set), tick, self._wish, self._tell)
+        run = _Run(stream, stream.reader(self._batches.poke), tick, self._wish, self._tell)
         with self._lock:
             self._runs.append(run)
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
-                self._thread.start()
-        self._news.set()
+            self._batches.start()
+        self._batches.poke()
         return run
 
     def close(self) -> None:
         """Write what is left of all runs, ended or not."""
-        self._closing = True
-        self._news.set()
-        if self._thread is not None:
-            self._thread.join(PATIENCE)
+        self._batches.close(PATIENCE)
 
     # On the recorder's thread
 
-    def _work(self) -> None:
-        pruned = False
-        while True:
-            last = self._closing
-            self._news.clear()
-            for run in list(self._runs):
-                if run.step(time.monotonic(), last=last):
-                    self._let_go(run)
-            if last:
-                return
-            if not pruned and self._wish.first is None:
-                pruned = True
-                prune(self._wish.where)
-            self._news.wait(BEAT)
-            if not self._closing:
-                time.sleep(BATCH)
+    def _step(self, last: bool) -> None:
+        for run in list(self._runs):
+            if run.step(time.monotonic(), last=last):
+                self._let_go(run)
+        if not last and not self._pruned:
+            self._pruned = True
+            prune(self._wish.where)
 
     def _let_go(self, run: _Run) -> None:
         with self._lock:

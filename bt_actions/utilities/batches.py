@@ -1,0 +1,50 @@
+"""A thread that does in batches what others queue for it: they wake it, and never wait for it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+BATCH = 0.05
+"""Seconds for which work gathers before it is done."""
+BEAT = 1.0
+"""Seconds between two steps where nobody has work."""
+
+
+class Batches:
+    """Calls `step` on a thread of its own, from `start` until `close`.
+
+    `step` is told whether it is called for the last time, and must not raise.
+    """
+
+    def __init__(self, name: str, step: Callable[[bool], None]) -> None:
+        self._step = step
+        self._news = threading.Event()
+        self._closing = False
+        self._thread = threading.Thread(target=self._work, name=name, daemon=True)
+        self.poke = self._news.set
+        """Have work done soon; on any thread."""
+
+    def start(self) -> None:
+        """Begin; not on two threads at once. Later calls do nothing."""
+        if self._thread.ident is None:
+            self._thread.start()
+
+    def close(self, patience: float) -> None:
+        """Have all work done; wait so many seconds at most, as a disk may hang."""
+        self._closing = True
+        self.poke()
+        if self._thread.ident is not None:
+            self._thread.join(patience)
+
+    def _work(self) -> None:
+        while True:
+            last = self._closing
+            self._news.clear()
+            self._step(last)
+            if last:
+                return
+            self._news.wait(BEAT)
+            if not self._closing:
+                time.sleep(BATCH)
