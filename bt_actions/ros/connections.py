@@ -46,6 +46,7 @@ def qos_profile(name: str) -> QoSProfile:
         "latched": QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
         "best_effort": QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT),
         "services": qos_profile_services_default,
+        "events": QoSProfile(depth=100),
         "rosout": QoSProfile(  # that of rclpy's loggers
             depth=1000,
             durability=DurabilityPolicy.TRANSIENT_LOCAL,

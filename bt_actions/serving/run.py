@@ -17,7 +17,6 @@ from bt_actions.document import Tree, tree_outputs
 from bt_actions.events import RunEnded, StopWanted
 from bt_actions.events.stream import Reader
 from bt_actions.messages.conversion import to_plain
-from bt_actions.recording.recorder import Recorder
 from bt_actions.ros.naming import server_name
 from bt_actions.running.runner import TreeRunner
 from bt_actions.serving.outcome import Ending, RunOutcome, outcome_of
@@ -32,7 +31,7 @@ class Run:
         tree: the version that was checked; a newer one does not matter any more.
         inputs: values that were checked with it.
         node: where goals are sent from; somebody spins it.
-        recorder: records the run.
+        watch: called with the runner before it runs.
         asked_by: the id of the RunTree goal, and of the run whose leaf sent it.
         begins: called with the full names of the servers that it uses, before it sends a goal.
         ended: called with the outcome, on the run's own thread, when all is over.
@@ -44,14 +43,14 @@ class Run:
         inputs: Mapping[str, object],
         node: Any,
         *,
-        recorder: Recorder | None = None,
+        watch: Callable[[TreeRunner], None] = lambda _: None,
         asked_by: tuple[str, str] = ("", ""),
         begins: Callable[[set[str]], None],
         ended: Callable[[RunOutcome], None],
     ) -> None:
         self.tree = tree
         self._inputs = inputs
-        self._node, self._asked_by, self._recorder = node, asked_by, recorder
+        self._node, self._asked_by, self._watch = node, asked_by, watch
         self._begins, self._ended = begins, ended
         self._lock = threading.Lock()
         self._runner: TreeRunner | None = None
@@ -117,8 +116,7 @@ class Run:
         self._begins({server_name(self._node, each.action_name) for each in leaves})
         status, error = Status.INVALID, None
         runner = TreeRunner(root, node=self._node, asked_by=self._asked_by)
-        if self._recorder is not None:
-            self._recorder.record(runner.stream, runner.ticks_since)
+        self._watch(runner)
         try:
             with self._lock:
                 self._runner, self._events = runner, runner.stream.reader()

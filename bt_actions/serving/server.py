@@ -22,10 +22,12 @@ from bt_actions.document import Tree
 from bt_actions.document.reading.find import tree_folder
 from bt_actions.recording.recorder import Recorder
 from bt_actions.ros.rosout import Level, Rosout
+from bt_actions.ros.run_topics import RunTopics
 from bt_actions.ros.serving.action_server import DeferredActionServer
 from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.ros.serving.lifecycle import Lifecycle
 from bt_actions.ros.serving.precedence import Precedence
+from bt_actions.running.runner import TreeRunner
 from bt_actions.serving.catalog import Catalog
 from bt_actions.serving.control import Control
 from bt_actions.serving.diagnostics import Diagnostics, Standing
@@ -71,9 +73,12 @@ class TreeServer:
         managed: be unconfigured at first, and have the services of a managed node; `lifecycle`
             changes the state from here. Otherwise goals are accepted at once.
         recorder: records each run; closed with the server.
+        publish_values: tell subscribers of ``~/events`` and ``~/tree`` goals, results, variables
+            and the like, too; secrets never.
 
     Names, relative to the node: the action ``run_tree``; the services ``~/list_trees``,
-    ``~/check_tree`` and ``~/control_tree``; the topic ``~/rejections``, which keeps the last ten.
+    ``~/check_tree`` and ``~/control_tree``; the topics ``~/events`` and ``~/tree`` of the runs,
+    and ``~/rejections``, which keeps the last ten.
 
     Close it while the node is spun, and before its context is shut down (as rclpy's own handler of
     Ctrl-C does it): otherwise the trees' goals are drained all the same, and no client is answered.
@@ -92,6 +97,7 @@ class TreeServer:
         python: Iterable[str] = (),
         managed: bool = False,
         recorder: Recorder | None = None,
+        publish_values: bool = False,
     ) -> None:
         folders = [trees] if isinstance(trees, str | os.PathLike) else list(trees)
         self.node = node
@@ -116,6 +122,7 @@ class TreeServer:
         self._endpoints = endpoints = Endpoints(node)
         self._rosout = Rosout(node)
         self._say = self._rosout.tell
+        self._topics = RunTopics(node, values=publish_values)
         self._rejections = Rejections(endpoints, self._say)
         self.precedence = Precedence(endpoints, "run_tree", self._say)
         self._action = DeferredActionServer(
@@ -167,6 +174,7 @@ class TreeServer:
             wait([self._worker.submit(int)], _LAST_WORDS)  # until what is awaited from it is there
         time.sleep(_LINGER)
         self._rosout.close()
+        self._topics.close()
         self._endpoints.close()
         self._action.destroy()
         if self.lifecycle is not None:
@@ -265,7 +273,7 @@ class TreeServer:
             admitted.tree,
             admitted.inputs,
             self.node,
-            recorder=self._recorder,
+            watch=self._watch,
             asked_by=(bytes(client.goal_id.uuid).hex(), client.request.caller_run[:ECHO]),
             ended=lambda outcome: self._ended(goal, outcome),
             begins=lambda servers: self._underway.begins(goal.id, servers),
@@ -338,6 +346,11 @@ class TreeServer:
             self._action.begin(goal.client)
             self._tell_of(goal, goal.begins)
             goal.run.start()
+
+    def _watch(self, runner: TreeRunner) -> None:
+        self._topics.follow(runner.stream)
+        if self._recorder is not None:
+            self._recorder.record(runner.stream, runner.ticks_since)
 
     def _end(self, goal: Goal, ending: Ending) -> None:
         """End a goal before its time, also one that waits for its turn."""

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from bt_actions import TreeError, TreeRunner, load_tree
+from bt_actions.cli import main
 from bt_actions.cli.arguments.ros_arguments import as_inputs, parameters
 from bt_actions.document import tree_inputs
 from bt_actions.running.shown import ShownRun
@@ -130,6 +131,41 @@ def test_a_failure_is_told_on_rosout_with_its_reason_and_is_printed_once(
     assert ends[0] == 40
     assert ends[1].startswith("one_move ends: FAILURE after ")
     assert not any("begins" in line or "ends:" in line for line in [*run.lines, *run.errors])
+
+
+@pytest.mark.parametrize("options", [[], ["--publish-values"]], ids=["no values", "values"])
+def test_events_and_states_are_topics_of_the_node_to_the_end_of_the_tree(
+    start: Start,
+    watcher: Watcher,
+    host: Host,
+    tree: Callable[..., Path],
+    namespace: str,
+    options: list[str],
+) -> None:
+    from tests.support.listener import Listener
+
+    server = f"{namespace}/move_robot"
+    listener = Listener(watcher.node, f"{namespace}/bt_actions_one_move")
+    path = tree(server=server, timeout="{server: 20 s, result: 20 s}")
+    run = start("run", str(path), "--namespace", namespace, *options)
+    watcher.until(lambda: listener.runs, "a state")
+    host.open(server, "1:abort")
+    try:
+        assert run.wait() == 1, run
+    finally:
+        host.close_server(server)
+    (run_id,) = listener.runs
+    watcher.until(lambda: listener.runs[run_id].finished, "the tree's end")
+    (failure,) = listener.runs[run_id].failures
+    (goal,) = failure.attempts
+    assert (goal.goal is not None) is bool(options)
+
+
+def test_the_topics_are_closed_with_the_run(no_leaks: None, tmp_path: Path) -> None:
+    path = tmp_path / "quick.yaml"
+    path.write_text("tree: quick\nroot: {success: }\n")
+    assert main(["run", str(path), "--no-record"]) == 0
+    assert "bt_actions-topics" not in [each.name for each in threading.enumerate()]
 
 
 def test_a_program_of_the_users_shows_its_runs_so_too(watcher: Watcher, tmp_path: Path) -> None:

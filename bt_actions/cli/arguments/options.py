@@ -116,6 +116,11 @@ _SHARED: dict[str, dict[str, Any]] = {
         "action": "store_true",
         "help": "show only what went wrong; the exit code tells",
     },
+    "--publish-values": {
+        "action": "store_true",
+        "help": "publish goals, results, feedback, variables, inputs and outputs on ~/events and "
+        "~/tree, too; secrets never. Whoever is in the ROS domain can read them",
+    },
     "--fault": {"metavar": "SPEC", "type": fault, "action": "append", "default": []},
     "--speed": {"metavar": "N", "type": speed},
     "--seed": {"metavar": "N", "type": int, "help": "seed of faults that happen by chance"},

@@ -89,6 +89,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "where --set does not",
     )
     add_options(parser, one_run=True)
+    add_option(parser, "--publish-values")
     simulated = parser.add_argument_group("simulation")
     servers = simulated.add_mutually_exclusive_group()
     servers.add_argument(
@@ -159,6 +160,7 @@ def run(args: argparse.Namespace) -> int:
         name=_node_name(args, tree_name(root)),
         outlook=outlook,
         recorder=records,
+        publish_values=args.publish_values,
     ) as session:
         view = session.view(as_json=args.json, plain=args.plain, verbose=args.verbose)
         return session.run(view, timeout=args.timeout, part_at=args.check_part)

@@ -24,7 +24,6 @@ from bt_actions.utilities.suggest import listing
 if TYPE_CHECKING:
     from bt_actions.cli.arguments.parser import Subparsers
     from bt_actions.cli.driving.signals import Signals
-    from bt_actions.recording.recorder import Recorder
     from bt_actions.serving import TreeServer
 
 NAME = "bt_actions_serve"
@@ -81,6 +80,7 @@ def add_parser(subparsers: Subparsers) -> None:
         help="namespace of the node, and thereby of run_tree and every relative action name",
     )
     add_options(parser, one_run=False)
+    add_option(parser, "--publish-values")
     more = f"; the parameters {listing(_HELP)} are used where the options are not given"
     add_ros_args(parser, more)
 
@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
         return code
     return serve(
         "serve",
-        lambda node: _server(node, options, records),
+        lambda node: _server(node, options, recorder=records, publish_values=args.publish_values),
         announce=lambda server: _announce(server, managed=options["managed"]),
         close=_close,
         conclude=_conclude,
@@ -180,7 +180,7 @@ def _checked(name: str, value: object) -> object:
     return value
 
 
-def _server(node: Any, options: Mapping[str, Any], records: Recorder | None) -> TreeServer:
+def _server(node: Any, options: Mapping[str, Any], **more: Any) -> TreeServer:
     from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 
     from bt_actions.document import TreeNotFoundError
@@ -208,7 +208,7 @@ def _server(node: Any, options: Mapping[str, Any], records: Recorder | None) -> 
             most=options["max"],
             python=options["python"],
             managed=True,
-            recorder=records,
+            **more,
         )
     except (OSError, TreeNotFoundError) as error:
         raise BadInput(f"--trees: {error}") from error

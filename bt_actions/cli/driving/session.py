@@ -68,10 +68,11 @@ class Session:
         name: str = "",
         outlook: Outlook | None = None,
         recorder: Recorder | None = None,
+        publish_values: bool | None = None,
     ) -> None:
         """`outlook` is where the node is made, called `name`; it is the session's to close.
 
-        `recorder` records the run.
+        `recorder` records the run. With `publish_values` given, the node has the run's topics.
 
         Raises BadInput when ROS is not there or cannot start, or a fault fits no server."""
         with importing_ros():
@@ -93,6 +94,12 @@ class Session:
         self._error: BaseException | None = None
         self._shown = ShownRun(self._runner, root)
         self._runner.on_close(lambda: self._shown.close(error=self._error))
+        if publish_values is not None:
+            from bt_actions.ros.run_topics import RunTopics
+
+            topics = RunTopics(self._runner.node, values=publish_values)
+            topics.follow(self._runner.stream)
+            self._runner.on_close(topics.close)
         self._output = PatientOutput()
         self._simulator = None
         if simulation is not None:

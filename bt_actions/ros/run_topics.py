@@ -1,0 +1,193 @@
+"""What happens in the runs of a node, and how they stand: its topics ``~/events`` and ``~/tree``.
+
+A thread of its own publishes: no tick waits for a subscriber. A subscriber that comes late, or
+that has lost events, takes the whole state from ``~/tree`` and goes on from its number: each new
+subscription is sent a state that the next event follows. Without subscriptions nothing is encoded.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from bt_actions_interfaces.msg import RunEvent, RunState, RunStates
+from rclpy.node import Node
+from rclpy.time import Time
+
+from bt_actions.events import (
+    Event,
+    EventsLost,
+    Moment,
+    NodeChanged,
+    NodesAdded,
+    NodesRemoved,
+    RunBegan,
+    RunEnded,
+    TreeFinished,
+    to_line,
+)
+from bt_actions.events.bare import bare
+from bt_actions.events.stream import Stream
+from bt_actions.ros.node_participant import NodeParticipant
+from bt_actions.story.keeping import to_json
+from bt_actions.story.state import State
+from bt_actions.utilities.batches import Batches
+from bt_actions.utilities.plain_text import clean
+
+STATE_WITHIN = 10.0
+"""Seconds after any event within which the state that has it is published."""
+_SOONER: dict[type[Event], float] = {
+    RunBegan: 0.0,
+    TreeFinished: 0.0,
+    RunEnded: 0.0,
+    EventsLost: 0.0,
+    NodesAdded: 1.0,
+    NodesRemoved: 1.0,
+}
+"""The same after some kinds of events."""
+PATIENCE = 2.0
+"""Seconds for the last events to be published when the topics are closed."""
+
+
+class RunTopics:
+    """The two topics of a node, for all of its runs.
+
+    With `values`, subscribers are also told goals, results, feedback, variables, inputs and
+    outputs; secrets and the text of tree files never.
+    """
+
+    def __init__(self, node: Node, *, values: bool = False) -> None:
+        participant = NodeParticipant.of(node)
+        self._events = participant.publisher(RunEvent, "~/events", "events")
+        self._states = participant.publisher(RunStates, "~/tree", "latched")
+        self._values = values
+        self._runs: list[_Run] = []
+        self._listeners = 0
+        self._due = math.inf
+        """When a state is to be published, on the steady clock."""
+        self._batches = Batches("bt_actions-topics", self._step)
+        self._batches.start()
+
+    def follow(self, stream: Stream) -> None:
+        """Publish what happens from now on in a run, until its RunEnded."""
+        self._runs.append(_Run(stream, self._batches.poke, values=self._values))
+
+    def close(self) -> None:
+        """Publish what has come, and be gone, while the node is still there."""
+        self._batches.close(PATIENCE)
+        self._events.close()
+        self._states.close()
+
+    # On the thread of the topics
+
+    def _step(self, last: bool) -> None:
+        with contextlib.suppress(Exception):  # the context was shut down before
+            self._publish(time.monotonic())
+
+    def _publish(self, now: float) -> None:
+        heard, watched = self._events.listeners, self._states.listeners
+        if heard + watched > self._listeners:
+            self._due = now
+        self._listeners = heard + watched
+        for run in list(self._runs):
+            for event in run.take():
+                self._due = min(self._due, now + _SOONER.get(type(event), STATE_WITHIN))
+                told = run.fold(event)
+                if heard and not isinstance(event, EventsLost):  # the gap in the numbers tells it
+                    self._events.publish(run.message(event, told))
+                if isinstance(event, RunEnded):
+                    self._over(run)
+                time.sleep(0)  # whoever waits for Python's lock is next
+        if watched and now >= self._due:
+            self._due = math.inf
+            states = [run.standing() for run in self._runs if run.state.began is not None]
+            self._states.publish(RunStates(runs=states))
+
+    def _over(self, run: _Run) -> None:
+        """Keep a run as the latest that has ended, and none that ended before."""
+        for other in list(self._runs):
+            if other.over:
+                self._runs.remove(other)
+        run.leave()
+
+
+class _Run:
+    """One run of the node."""
+
+    def __init__(self, stream: Stream, poke: Callable[[], None], *, values: bool) -> None:
+        self._stream, self._values = stream, values
+        self._reader = stream.reader(poke)
+        self._early: list[Event] = []
+        """What came before the run began, and so before its id."""
+        self._id: list[int] = []
+        self.state = State()
+        self.over = False
+        self._latest = Moment(0, 0.0, 0.0, 0.0)
+        self._standing = RunState()
+        """How the run stood when somebody last wanted to know."""
+
+    def take(self) -> list[Event]:
+        """Return what has come since the last call, once the run's id is known."""
+        events, self._early = self._early + self._reader.take(), []
+        if not self._id:
+            began = next((each for each in events if isinstance(each, RunBegan)), None)
+            if began is None:
+                self._early = events
+                return []
+            self._id = _bytes(began)
+        return events
+
+    def fold(self, event: Event) -> Event | None:
+        """Take in an event; return what subscribers may know of it."""
+        told: Event | None = event
+        if isinstance(event, RunBegan):
+            self._id, told = _bytes(event), replace(event, sources={})
+        if not self._values and told is not None:
+            told = bare(told)
+        self._latest = event.at
+        if told is not None:
+            self.state.observe(told)
+        return told
+
+    def message(self, event: Event, told: Event | None) -> RunEvent:
+        """Return an event as it is published: of one that nobody may know, its kind."""
+        status: int = RunEvent.NONE
+        if isinstance(event, NodeChanged):
+            status = getattr(RunEvent, event.status.name)
+        return RunEvent(
+            run_id=self._id,
+            number=event.at.number,
+            stamp=_stamp(event.at),
+            node=getattr(event, "node", None) or 0,
+            status=status,
+            kind=type(event).__name__,
+            data="" if told is None else to_line(told),
+        )
+
+    def standing(self) -> RunState:
+        """Return how the run stands, as it is published."""
+        if self._standing.number != self._latest.number:
+            self._standing = RunState(
+                run_id=self._id,
+                number=self._latest.number,
+                stamp=_stamp(self._latest),
+                tree=clean(self.state.tree),
+                data=to_json(self.state),
+            )
+        return self._standing
+
+    def leave(self) -> None:
+        """Take note that the run is over."""
+        self.over = True
+        self._stream.leave(self._reader)
+
+
+def _bytes(began: RunBegan) -> list[int]:
+    return list(bytes.fromhex(began.run_id))
+
+
+def _stamp(at: Moment) -> object:
+    return Time(nanoseconds=round(at.ros * 1e9)).to_msg()
