@@ -6,7 +6,11 @@ from pathlib import Path
 from setuptools import Distribution, setup
 
 SHARE = "share/bt_actions"
-SHARED = [*sorted(Path("trees").rglob("*.y*ml")), *sorted(Path("launch").glob("*.launch.py"))]
+SHARED = [
+    *sorted(Path("trees").rglob("*.y*ml")),
+    *sorted(Path("launch").glob("*.launch.py")),
+    *sorted(Path("foxglove").glob("*.json")),
+]
 
 # colcon installs the command itself there (setup.cfg), and calls `install` or `develop`.
 IS_WHEEL = any(word.endswith("_wheel") for word in sys.argv)

@@ -24,7 +24,7 @@ def wheel(
     copy = tmp_path_factory.mktemp("project")
     for name in ("setup.py", "setup.cfg", "pyproject.toml", "package.xml", "LICENSE"):
         shutil.copy(ROOT / name, copy)
-    for name in ("bt_actions", "launch", "resource", "trees"):
+    for name in ("bt_actions", "foxglove", "launch", "resource", "trees"):
         shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
     build = f"from setuptools import build_meta; build_meta.{request.param}('.')"
     subprocess.run([sys.executable, "-c", build], cwd=copy, check=True, capture_output=True)
@@ -33,14 +33,16 @@ def wheel(
         yield opened
 
 
-def test_trees_and_launch_files_are_installed_where_ros_looks_for_them(wheel: ZipFile) -> None:
+def test_trees_launch_files_and_layouts_are_where_ros_looks_for_them(wheel: ZipFile) -> None:
     share = f"{DATA}/share/bt_actions/"
     installed = {name.removeprefix(share) for name in wheel.namelist() if name.startswith(share)}
     trees = {str(tree.relative_to(ROOT)) for tree in (ROOT / "trees").rglob("*.y*ml")}
     launch = {str(file.relative_to(ROOT)) for file in (ROOT / "launch").glob("*.launch.py")}
+    layouts = {str(file.relative_to(ROOT)) for file in (ROOT / "foxglove").glob("*.json")}
     assert trees
     assert launch
-    assert installed == trees | launch | {"package.xml"}
+    assert layouts
+    assert installed == trees | launch | layouts | {"package.xml"}
 
 
 def test_the_package_is_registered_with_ament(wheel: ZipFile) -> None:
