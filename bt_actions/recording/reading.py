@@ -171,6 +171,8 @@ class Recording:
         return not self._run_id or _hex(run_id) == self._run_id
 
     def _event(self, text: str, log_time: int, run_id: str) -> Iterator[Item]:
+        if not text:  # values that were not for whoever has recorded a bag
+            return
         event = from_line(text)
         self._base = log_time - nanoseconds(event.at.steady)
         self._number = event.at.number

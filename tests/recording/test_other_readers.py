@@ -7,18 +7,26 @@ import json
 import random
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from bt_actions.events import Event, RunBegan, to_line
+from bt_actions.events.bare import bare
+from bt_actions.messages.definition import ros2msg
 from bt_actions.recording.finishing import finish
 from bt_actions.recording.folders import parts_of
 from bt_actions.recording.layout import GOALS, LAYOUTS, LOG, STATE, TRANSITIONS, decode, encode
 from bt_actions.recording.mcap_records import Channel, Message, records
+from bt_actions.recording.reading import Recording
 from bt_actions.recording.writing import RunWriter
-from tests.support.every_kind import every_kind
+from bt_actions.story.state import State
+from tests.support.every_kind import RUN_ID, every_kind
 
 LAYOUT = Path(__file__).parents[2] / "foxglove" / "bt_actions.json"
 
@@ -154,3 +162,76 @@ def test_each_panel_of_the_layout_is_placed() -> None:
             yield from (*placed(part["first"]), *placed(part["second"]))
 
     assert sorted(placed(layout["layout"])) == sorted(layout["configById"])
+
+
+def bag_of(folder: Path, topic: str, messages: list[Any]) -> Path:
+    """A bag as `ros2 bag record` makes it; return its file."""
+    from rclpy.serialization import serialize_message
+
+    kind = type(messages[0])
+    name = f"{kind.__module__.partition('.')[0]}/msg/{kind.__name__}"
+    store = get_typestore(Stores.EMPTY)
+    store.register(get_types_from_msg(ros2msg(name), name))
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        connection = bag.add_connection(topic, name, typestore=store)
+        for number, each in enumerate(messages):
+            bag.write(connection, number, serialize_message(each))
+    return folder / f"{folder.name}.mcap"
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("values", [True, False])
+def test_a_bag_of_events_is_a_recording_of_each_of_its_runs(tmp_path: Path, values: bool) -> None:
+    from bt_actions_interfaces.msg import RunEvent
+
+    def message(event: Event, run_id: str) -> RunEvent:
+        event = replace(event, run_id=run_id) if isinstance(event, RunBegan) else event
+        told = event if values else bare(event)
+        return RunEvent(
+            run_id=list(bytes.fromhex(run_id)),
+            number=event.at.number,
+            kind=type(event).__name__,
+            data="" if told is None else to_line(told),
+        )
+
+    events, ids = every_kind(), (RUN_ID, "ee" * 16)
+    told = [message(each, run_id) for each in events for run_id in ids]
+    file = bag_of(tmp_path / "bag", "/bt_actions_serve/events", told)
+    began = Recording(file).state().began
+    assert began is not None
+    assert began.run_id == RUN_ID, "the first"
+    for run_id in ids:
+        recording = Recording(file, run_id)
+        read = [each for each in recording.items() if not isinstance(each, State)]
+        known = [each if values else bare(each) for each in events]
+        kinds = [type(each) for each in known if each is not None]
+        assert [type(each) for each in read] == kinds
+        assert [each.run_id for each in read if isinstance(each, RunBegan)] == [run_id]
+        assert recording.damaged == 0
+
+
+@pytest.mark.ros
+def test_the_goals_of_a_run_are_found_in_a_bag_as_the_page_says(
+    night: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from action_msgs.msg import GoalStatus, GoalStatusArray
+
+    state = Recording(night).state()
+    goals = [key for action in state.actions for key in action.goals]
+    strange = [*goals, "ab" * 16]
+    arrays = []
+    for key in strange:
+        status = GoalStatus(status=GoalStatus.STATUS_EXECUTING)
+        status.goal_info.goal_id.uuid = list(bytes.fromhex(key))
+        arrays.append(GoalStatusArray(status_list=[status]))
+    bag_of(tmp_path / "my_bag", "/move_robot/_action/status", arrays)
+    page = (LAYOUT.parents[1] / "docs" / "recording.md").read_text()
+    (code,) = (each for each in re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+               if "AnyReader" in each)  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    exec(code.replace("pick_and_place", str(night)), {})
+    lines = capsys.readouterr().out.splitlines()
+    assert [int(line.split()[0]) for line in lines] == list(range(len(goals)))
