@@ -9,16 +9,17 @@ from typing import Any
 
 import pytest
 from action_msgs.msg import GoalStatus
+from bt_actions_interfaces.action import RunTree as RunTreeAction
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from robot_control_interfaces.action import MoveRobot as Move
 from test_msgs.action import Fibonacci
 
-from bt_actions import ActionBehaviour, End, MoveRobot, Outcome, Timeouts
+from bt_actions import ActionBehaviour, End, MoveRobot, Outcome, RunTree, Timeouts
 from bt_actions.behaviours.leaves import Wait
 from bt_actions.events import Event, EventsLost, FeedbackCame, GoalChanged, Moment, ServerSeen
 from bt_actions.events.bare import bare
-from bt_actions.events.snapshot import HIDDEN
+from bt_actions.events.snapshot import HIDDEN, Value
 from bt_actions.simulation import RecordedServers, Script, ScriptedServer
 from bt_actions.simulation.recorded.run import RecordedGoal
 from bt_actions.simulation.recorded.servers import RecordedServer
@@ -164,6 +165,34 @@ def test_a_server_of_any_action_type_is_played() -> None:
     assert told(runner.events)[0][2] == {"sequence": (0, 1, 3)}
 
 
+@pytest.mark.parametrize("settled", [True, False])
+def test_a_tree_that_another_server_runs_is_played_for_another_run(settled: bool) -> None:
+    network = VirtualNetwork()
+    result = RunTreeAction.Result(outputs='{"pose": 2.0}', settled=settled)
+    script = Script(result=lambda goal: result)
+    ScriptedServer(network, RunTreeAction, "run_tree", script, faults=["run_tree:2:abort"])
+    first = VirtualRunner(in_sequence(RunTree("A", "pick"), RunTree("B", "place")), network)
+    first.run()
+    tree = in_sequence(RunTree("A", "pick"), RunTree("B", "place"))
+    network = VirtualNetwork()
+    RecordedServers(network, tree, first.events)
+    runner = VirtualRunner(tree, network, seed=7)  # goals name the run that sends them
+    runner.run()
+    assert told(runner.events) == told(first.events)
+    assert warnings(runner) == []
+
+
+def test_a_tree_that_was_canceled_and_may_have_left_goals_is_canceled_as_soon_again() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, RunTreeAction, "run_tree", Script(duration=60.0))
+    first = VirtualRunner(RunTree("A", "pick", timeout=Timeouts(result=1.0)), network)
+    first.run()
+    assert [end for _, end, _ in told(first.events)] == [End.UNKNOWN]
+    runner, _ = again(RunTree("A", "pick", timeout=Timeouts(result=1.0)), first.events)
+    assert told(runner.events) == told(first.events)
+    assert runner.now == pytest.approx(first.now, abs=0.3)
+
+
 def test_a_goal_that_another_client_canceled_is_canceled_again() -> None:
     network = VirtualNetwork()
     server = ScriptedServer(network, Move, "move_robot", Script(duration=3.0))
@@ -190,7 +219,7 @@ class Deaf:
 class TestOnEitherNetwork:
     def serve(self, bench: Bench, space: str, end: End, away: float = 0.0) -> Client:
         """Serve one recorded goal of a tenth of a second."""
-        goal = RecordedGoal({"order": 0}, 0.0, accepted=0.0, over=0.1, end=end, away=away)
+        goal = RecordedGoal({"order": 0}, 0.0, accepted=0.0, over=0.1, ended=end, away=away)
         goal.result = {"sequence": (5,)}
         client = bench.client(Fibonacci, f"{space}/fibonacci")
         bench.serve(RecordedServer(bench.node, Fibonacci, f"{space}/fibonacci", [goal]))
@@ -319,6 +348,19 @@ class TestWhichGoalIsWhich:
             "the tree has no leaf for /move_robot: its goals are not asked for",
         ]
         assert VirtualRunner(new, network).run() is Status.SUCCESS
+
+    def test_a_goal_is_known_again_whatever_its_stamp(self) -> None:
+        first = recorded(in_sequence(move("A", 1.0), move("B", 2.0)))
+        stamp: Value = {"sec": 4, "nanosec": 0}
+        events = [
+            replace(each, goal={**each.goal, "stamp": stamp})
+            if isinstance(each, GoalChanged) and isinstance(each.goal, dict)
+            else each
+            for each in first.events
+        ]
+        runner, _ = again(in_sequence(move("B", 2.0), move("A", 1.0)), events)
+        assert [result["final_pose"] for _, _, result in told(runner.events)] == [2.0, 1.0]
+        assert warnings(runner) == []
 
 
 class TestWhatIsNotKnown:

@@ -25,12 +25,18 @@ from bt_actions.simulation.fault_plan import GoalFaults
 from bt_actions.simulation.faults import FaultKind
 from bt_actions.utilities.suggest import listing
 
-BY_SERVER = (End.SUCCEEDED, End.ABORTED, End.CANCELED)
+_BY_SERVER = (End.SUCCEEDED, End.ABORTED, End.CANCELED)
+_ENDED = {
+    Outcome.SUCCEEDED: End.SUCCEEDED,
+    Outcome.ABORTED: End.ABORTED,
+    Outcome.CANCELED_BY_OTHER: End.CANCELED,
+}
+"""What a server has said, also where its result tells of goals below whose end is UNKNOWN."""
 PROMPT = 0.1
 """What a server did within so many seconds of being asked, it does at once."""
 THINNED = 0.25
 """Seconds between two feedback messages of a goal that have perhaps lost others between them."""
-_ON_CANCEL = {
+_ON_CANCEL: dict[End | None, FaultKind] = {
     End.SUCCEEDED: FaultKind.SUCCEED_ON_CANCEL,
     End.ABORTED: FaultKind.ABORT_ON_CANCEL,
 }
@@ -48,7 +54,8 @@ class RecordedGoal:
     over: float | None = None
     """When its server had ended it, or was lost."""
     outcome: Outcome | None = None
-    end: End | None = None
+    ended: End | None = None
+    """How its server ended it."""
     result: Value = None
     feedback: list[tuple[float, Value]] = field(default_factory=list)
     """With the moment at which each message was told."""
@@ -62,10 +69,14 @@ class RecordedGoal:
             self.accepted = event.at.steady
         elif event.state == "CANCELING" and self.canceled is None and not is_lost:
             self.canceled = event.at.steady
-        if self.over is None and (is_lost or event.end in BY_SERVER):
-            self.over = event.at.steady
-        self.outcome, self.end = event.outcome, event.end
+        self.outcome = event.outcome
         self.result = self.result if event.result is None else event.result
+        if event.end in _BY_SERVER:
+            self.ended = event.end
+        elif event.outcome is not None and self.ended is None:
+            self.ended = _ENDED.get(event.outcome, End.CANCELED if event.result else None)
+        if self.over is None and (is_lost or self.ended is not None):
+            self.over = event.at.steady
 
     @property
     def began(self) -> float:
@@ -95,7 +106,7 @@ class RecordedGoal:
             found[FaultKind.DIE] = "execute"
         elif self.outcome is Outcome.SERVER_LOST:
             found[FaultKind.RESTART] = self.away
-        elif self.accepted is None and self.end not in BY_SERVER:
+        elif self.accepted is None and self.ended is None:
             found[FaultKind.DROP_GOAL] = None
         else:
             if self.began - self.sent > PROMPT:
@@ -110,8 +121,8 @@ class RecordedGoal:
             return
         if self.over - asked > PROMPT:
             found[FaultKind.DELAY_CANCEL] = self.over - asked
-        if self.end in _ON_CANCEL:
-            found[_ON_CANCEL[self.end]] = None
+        if self.ended in _ON_CANCEL:
+            found[_ON_CANCEL[self.ended]] = None
 
 
 @dataclass(slots=True, eq=False)
@@ -152,7 +163,7 @@ class RecordedRun:
         goals = list(self._goals.values())
         parts = {
             "goals": [each.goal for each in goals],
-            "results": [each.result for each in goals if each.end in BY_SERVER],
+            "results": [each.result for each in goals if each.ended is not None],
             "feedback messages": [value for each in goals for _, value in each.feedback],
         }
         cut = {what: sum(not is_whole(each) for each in of) for what, of in parts.items()}

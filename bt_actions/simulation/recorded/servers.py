@@ -40,6 +40,8 @@ STEP = 0.02
 """Seconds of simulated time between two looks at what is due."""
 LINGERS = 0.05
 """Wall seconds in which the result of the goal after which a server went reaches its client."""
+_OTHER_EACH_TIME = ("stamp", "caller_run")
+"""Fields by which a goal is not known again: the time in headers, and the run that sends a tree."""
 _FINISHES: dict[End | None, Finish] = {End.ABORTED: Finish.FAULT, End.CANCELED: Finish.CANCELED}
 
 
@@ -119,7 +121,7 @@ class RecordedServer(ScriptedServer):
     def verdict(self, motion: Any) -> tuple[Finish, str]:
         if not isinstance(motion, _Rerun):
             return super().verdict(motion)
-        finish = _FINISHES.get(motion.recorded.end, Finish.COMPLETED)
+        finish = _FINISHES.get(motion.recorded.ended, Finish.COMPLETED)
         return finish, "" if finish is Finish.COMPLETED else "as it was recorded"
 
     def result(self, motion: Any, finish: Finish, reason: str) -> Any:
@@ -146,9 +148,10 @@ class RecordedServer(ScriptedServer):
         if not self.left:
             self._warn(f"{new} is beyond the {self.recorded} recorded: its answer is made up")
             return None
-        found = next((each for each in self.left if each.goal == told), self.left[0])
+        key = _key(told)
+        found = next((each for each in self.left if _key(each.goal) == key), self.left[0])
         self.left.remove(found)
-        if found.goal != told and is_whole(found.goal):
+        if _key(found.goal) != key and is_whole(found.goal):
             self._warn(f"{new} is answered as {shorten(found.goal)} was in the recorded run")
         return found
 
@@ -265,6 +268,13 @@ class RecordedServers:
             came = ServerStory(story.goals)
             when = self._stepper.now() + story.away
             self._stepper.call_at(when, lambda now: self._open(kind, name, came))
+
+
+def _key(goal: Value) -> Value:
+    """What a goal is known by in another run."""
+    if isinstance(goal, dict):
+        return {name: _key(each) for name, each in goal.items() if name not in _OTHER_EACH_TIME}
+    return tuple(map(_key, goal)) if isinstance(goal, tuple) else goal
 
 
 def _opened(value: Value) -> Value:
