@@ -25,6 +25,7 @@ from bt_actions.events.snapshot import Cut
 
 _LATEST = 1e11
 """Seconds of any clock, at most: a date of it can be written, and a difference taken."""
+_JSON = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 _EXACT = 2**53
 """Up to which every reader of JSON has whole numbers exactly."""
 KINDS: dict[str, type[Event]] = {
@@ -41,7 +42,7 @@ class WireError(ValueError):
 
 def to_line(event: Event) -> str:
     """Return an event as one line of ASCII without its end."""
-    return json.dumps(to_plain(event), separators=(",", ":"), allow_nan=False)
+    return _JSON.encode(to_plain(event))
 
 
 def from_line(line: str | bytes) -> Event:
@@ -54,8 +55,7 @@ def from_line(line: str | bytes) -> Event:
 
 def to_plain(event: Event) -> dict[str, Any]:
     """Return an event as data that JSON can say; `kind` is its name."""
-    fields = {each.name: packed(getattr(event, each.name)) for each in dataclasses.fields(event)}
-    return {"kind": type(event).__name__, **fields}
+    return {"kind": type(event).__name__, **_fields_of(event)}
 
 
 def from_plain(data: object) -> Event:
@@ -78,25 +78,30 @@ def from_plain(data: object) -> Event:
 
 def packed(value: Any) -> Any:
     """Return what an event holds as data that JSON can say."""
-    if isinstance(value, enum.Enum):
-        return value.value
-    if value is None or isinstance(value, str | bool):
+    kind = type(value)
+    if value is None or kind is str or kind is bool:
         return value
-    if isinstance(value, int):
-        return value if -_EXACT <= value <= _EXACT else {"$int": str(value)}
-    if isinstance(value, float):
+    if kind is float:
         return value if math.isfinite(value) else {"$float": str(value)}
-    if isinstance(value, bytes):
-        return {"$bytes": base64.b64encode(value).decode()}
-    if isinstance(value, Cut):
-        return {"$cut": [packed(value.head), value.more]}
-    if dataclasses.is_dataclass(value):
-        return {each.name: packed(getattr(value, each.name)) for each in dataclasses.fields(value)}
+    if kind is int:
+        return value if -_EXACT <= value <= _EXACT else {"$int": str(value)}
     if isinstance(value, tuple):
         return [packed(item) for item in value]
-    if any(name.startswith("$") for name in value):
-        return {"$map": [[name, packed(item)] for name, item in value.items()]}
-    return {name: packed(item) for name, item in value.items()}
+    if kind is dict:
+        if any(name.startswith("$") for name in value):
+            return {"$map": [[name, packed(item)] for name, item in value.items()]}
+        return {name: packed(item) for name, item in value.items()}
+    if isinstance(value, enum.Enum):
+        return value.value
+    if kind is bytes:
+        return {"$bytes": base64.b64encode(value).decode()}
+    if kind is Cut:
+        return {"$cut": [packed(value.head), value.more]}
+    return _fields_of(value)
+
+
+def _fields_of(held: Any) -> dict[str, Any]:
+    return {name: packed(getattr(held, name)) for name in held.__dataclass_fields__}
 
 
 def _value(data: Any) -> Any:

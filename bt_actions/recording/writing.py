@@ -15,7 +15,8 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from mcap.writer import Writer
+from mcap.data_stream import RecordBuilder
+from mcap.records import Attachment, Channel, Header, Schema
 from py_trees.common import Status
 
 from bt_actions.events import (
@@ -44,6 +45,7 @@ from bt_actions.recording.layout import (
     nanoseconds,
     stamp,
 )
+from bt_actions.recording.mcap_records import MAGIC, message_record
 from bt_actions.story.keeping import to_json
 from bt_actions.story.state import State
 from bt_actions.utilities.plain_text import as_json
@@ -143,12 +145,14 @@ class RunWriter:
 
     def _open(self) -> None:
         """Begin a file: its header, and what its topics hold."""
-        self._writer = Writer(self._buffer, use_chunking=False, enable_crcs=False)
-        self._writer.start(profile="ros2", library="bt_actions")
+        self._buffer.write(MAGIC)
+        self._record(Header("ros2", "bt_actions"))
         self._sequences = dict.fromkeys(LAYOUTS, 0)
         for topic, layout in LAYOUTS.items():
-            schema = self._writer.register_schema(layout.type, "ros2msg", _schema(layout.type))
-            self._writer.register_channel(topic, "cdr", schema, QOS)
+            number = CHANNELS[topic]
+            text = _schema(layout.type)
+            self._record(Schema(id=number, name=layout.type, encoding="ros2msg", data=text))
+            self._record(Channel(number, topic, "cdr", QOS, number))
 
     def _begin_part(self) -> None:
         """Go on in another file, which begins with the state of the run."""
@@ -180,11 +184,11 @@ class RunWriter:
             at = self._log_time(event.at)
             for path, text in event.sources.items():
                 data = text.encode("utf-8", "replace")
-                self._writer.add_attachment(at, at, f"trees/{path}", "application/yaml", data)
+                self._record(Attachment(at, at, f"trees/{path}", "application/yaml", data))
             plain = to_plain(replace(event, sources={}))
             for name in ("inputs", "versions"):
                 data = as_json(plain[name]).encode()
-                self._writer.add_attachment(at, at, f"{name}.json", "application/json", data)
+                self._record(Attachment(at, at, f"{name}.json", "application/json", data))
         return replace(event, sources={})
 
     def _is_spared(self, event: FeedbackCame) -> bool:
@@ -228,15 +232,15 @@ class RunWriter:
         story = self.state.nodes.get(node)
         return story.node.name if story is not None else ""
 
+    def _record(self, record: Header | Schema | Channel | Attachment) -> None:
+        builder = RecordBuilder()
+        record.write(builder)
+        self._buffer.write(builder.end())
+
     def _message(self, topic: str, at: Moment, data: bytes) -> None:
         self._sequences[topic] += 1
-        self._writer.add_message(
-            CHANNELS[topic],
-            self._log_time(at),
-            data,
-            nanoseconds(at.wall),
-            self._sequences[topic] % 2**32,
-        )
+        head = CHANNELS[topic], self._sequences[topic] % 2**32, self._log_time(at)
+        self._buffer.write(message_record(*head, nanoseconds(at.wall), data))
 
     def _log_time(self, at: Moment) -> int:
         return max(0, nanoseconds(at.steady) + self._base)
