@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bt_actions.cli.driving.recorded import RUN, reading
 from bt_actions.cli.exits import BadInput, Exit
 from bt_actions.cli.streams.results import results
 from bt_actions.cli.streams.writing import columns, write
@@ -41,7 +41,7 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="RUN",
         nargs="?",
         default="",
-        help="first letters of an id, name of a tree, .mcap file, or folder of a bag [the last]",
+        help=f"{RUN} [the last]",
     )
     parser.add_argument("--full", action="store_true", help="all lines, however long the run was")
     parser.add_argument(
@@ -60,13 +60,9 @@ def run(args: argparse.Namespace) -> int:
     if args.output is not None and args.output.suffix not in _FORMS:
         raise BadInput(f"-o {args.output}: a report is written as .md or .json")
     from bt_actions.recording import report
-    from bt_actions.recording.folders import NoRun, find
-    from bt_actions.recording.reading import RecordingError
 
-    try:
-        first = find(args.run)
-        _finish(first)
-        found = report.reports(first, values=args.values)
+    with reading(args.run) as recording:
+        found = report.reports(recording.first, values=args.values)
         for _ in range(report.LEVELS):
             above = None if args.run else report.caller_of(found[0])
             if above is not None:  # the last run is the one that a person has begun
@@ -76,21 +72,7 @@ def run(args: argparse.Namespace) -> int:
         else:
             for line in report.text(found, full=args.full, width=columns(results()) - 2):
                 write(f"{line}\n")
-    except (NoRun, RecordingError) as error:
-        raise BadInput(str(error)) from error
-    except RecursionError as error:
-        raise BadInput(f"{first} holds values within values without an end") from error
     return Exit.SUCCESS
-
-
-def _finish(first: Path) -> None:
-    """Finish a recording of ours that a killed process left, and no bag of others."""
-    from bt_actions.recording.finishing import finish
-    from bt_actions.recording.folders import read_summary
-
-    with contextlib.suppress(OSError):  # a folder that cannot be written
-        if read_summary(first) is not None:
-            finish(first)
 
 
 def _write(path: Path, found: list[Report], *, full: bool) -> None:
