@@ -28,6 +28,7 @@ COMMANDS = {
     "control": "control",
     "runs": "runs",
     "report": "report",
+    "replay": "replay",
     "sim": "sim",
     "cleanup": "cleanup",
     "check": "check",

@@ -14,6 +14,7 @@ import pytest
 
 from bt_actions.cli.driving import signals
 from tests.support.processes import Host, Journal, Process
+from tests.support.terminal import Terminal
 
 _numbers = itertools.count(1)
 
@@ -38,6 +39,20 @@ def environment() -> Iterator[None]:
 def start(start_program: Callable[..., Process]) -> Start:
     """Start `bt-actions` with some arguments, as a process of its own."""
     return lambda *arguments: start_program("-m", "bt_actions.cli", *arguments)
+
+
+@pytest.fixture
+def terminal(domain: int) -> Iterator[Callable[..., Terminal]]:
+    """Start `bt-actions` with some arguments in a terminal of its own."""
+    terminals: list[Terminal] = []
+
+    def start(*arguments: str, **environment: str) -> Terminal:
+        terminals.append(Terminal(*arguments, **environment))
+        return terminals[-1]
+
+    yield start
+    for each in terminals:
+        each.close()
 
 
 @pytest.fixture

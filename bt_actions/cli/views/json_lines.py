@@ -14,10 +14,12 @@ from bt_actions.events import (
     Cut,
     Event,
     GoalChanged,
+    Moment,
     Node,
     NodeChanged,
     RoundBegan,
     RunBegan,
+    RunEnded,
     StopWanted,
     TickLasts,
     Value,
@@ -38,6 +40,8 @@ KINDS = {
     AttemptEnded: "attempt",
 }
 """The events of a node that are written, as `event` has them."""
+_NOTHING = RunEnded(Moment(0, 0.0, 0.0, 0.0), 0)
+"""In place of the end of a recorded run that has none."""
 
 
 class JsonView(View):
@@ -76,13 +80,12 @@ class JsonView(View):
 
     def _finished(self) -> dict[str, object]:
         state = self._state
-        ended, finished = state.ended, state.finished
-        assert ended is not None
+        ended, finished = state.ended or _NOTHING, state.finished
         error = (finished is not None and finished.error) or ended.error
         return {
             "event": "finished",
             "status": state.status.value,
-            "exit_code": ended.exit_code,
+            "exit_code": ended.exit_code if state.ended is not None else None,
             "cause": ended.cause or None,
             "error": error or None,
             "duration": round(state.elapsed, 3),

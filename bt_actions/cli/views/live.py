@@ -51,7 +51,8 @@ def suits(console: Console) -> bool:
 class LiveView(View):
     """Draws from the state; `finish` must be called, or the terminal keeps the drawing."""
 
-    def __init__(self, state: State, console: Console) -> None:
+    def __init__(self, state: State, console: Console, *, whole: bool = False) -> None:
+        """`whole` takes the terminal as a whole, and gives back what stood there."""
         self._state = state
         self._console = console
         self._plain = console.options.ascii_only
@@ -67,6 +68,7 @@ class LiveView(View):
         self._live = Live(
             console=console,
             auto_refresh=False,
+            screen=whole,
             transient=True,
             redirect_stdout=False,
             redirect_stderr=False,
@@ -110,7 +112,9 @@ class LiveView(View):
     def frame(self, now: float) -> None:
         """Draw."""
         self._let_by()
-        self._live.update(Text("\n").join(self._lines(now)), refresh=True)
+        height = self._console.height - 1
+        lines = self._lines(now, max(1, height // 3, height - SCROLLS))
+        self._live.update(Text("\n").join(lines), refresh=True)
 
     def say(self, text: str) -> None:
         """Let `text` scroll by."""
@@ -156,10 +160,8 @@ class LiveView(View):
         glyph = self._glyph(story.status), _STYLES[story.status]
         return Text.assemble(glyph, " ", name, (f"  {said}" if said else "", "dim"))
 
-    def _lines(self, now: float) -> list[Text]:
-        """The progress line, and as many nodes as there is room for."""
-        height = self._console.height - 1
-        most = max(1, height // 3, height - SCROLLS)
+    def _lines(self, now: float, most: int) -> list[Text]:
+        """The progress line, and as many nodes as there is room for: `most` lines in all."""
         lines = [self._progress(now)]
         running = [node for node in self._running if node in self._position]
         tree = self._state, self._nodes, self._position
