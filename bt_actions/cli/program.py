@@ -29,6 +29,7 @@ COMMANDS = {
     "runs": "runs",
     "report": "report",
     "replay": "replay",
+    "diff": "diff",
     "sim": "sim",
     "cleanup": "cleanup",
     "check": "check",
