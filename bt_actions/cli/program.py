@@ -30,6 +30,7 @@ COMMANDS = {
     "report": "report",
     "replay": "replay",
     "diff": "diff",
+    "stats": "stats",
     "sim": "sim",
     "cleanup": "cleanup",
     "check": "check",
