@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -322,3 +323,31 @@ root:
     for path in (tmp_path / "x.json", tmp_path / "x.md"):
         assert "third-0815" in path.read_text()
         assert SECRET not in path.read_text()
+
+
+def test_a_run_that_a_server_of_trees_ran_is_told_below_the_leaf(
+    start: Start, tmp_path: Path, namespace: str, capsys: Out
+) -> None:
+    below = tmp_path / "below"
+    below.mkdir()
+    (below / "fetch.yaml").write_text(
+        "tree: fetch\ninputs: {at: {type: float64}}\nroot: {check: $at > 9.0, name: Far enough}\n"
+    )
+    tree = tmp_path / "deliver.yaml"
+    tree.write_text(
+        "tree: deliver\nroot:\n  run_tree: Get it\n  tree: fetch\n"
+        f"  server: {namespace}/run_tree\n  inputs: {{at: 3.125}}\n"
+    )
+    server = start("serve", "--trees", str(below), "--namespace", namespace)
+    server.line("ready", within=30.0)
+    assert start("run", str(tree)).wait(40.0) == 1
+    server.send(signal.SIGINT)
+    server.wait(20.0)
+    main(["report"])
+    heads = [line for line in capsys.readouterr().out.splitlines() if line[:1].strip()]
+    assert heads[0].startswith("deliver: FAILURE after ")
+    assert [line for line in heads if line.startswith("below Get it: fetch: FAILURE after ")]
+    main(["runs", "--failed"])
+    rows = columns_of(capsys.readouterr().out)
+    assert [row[3] for row in rows] == ["fetch", "deliver"]
+    assert " ".join(rows[0][6:]) == "Far enough: $at > 9.0 is false: $at is 3.125"

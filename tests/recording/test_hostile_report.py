@@ -6,6 +6,7 @@ import copy
 import json
 import random
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ import pytest
 from mcap.writer import Writer
 
 from bt_actions.cli.commands.report import data
-from bt_actions.events import to_line
+from bt_actions.events import GoalChanged, to_line
+from bt_actions.recording import reading
+from bt_actions.recording.folders import summary_of
 from bt_actions.recording.layout import EVENTS, LAYOUTS, STATE, encode
 from bt_actions.recording.reading import RecordingError
 from bt_actions.recording.report import markdown, reports, text
@@ -146,6 +149,26 @@ def test_a_file_that_is_cut_has_a_report_of_what_is_left(tmp_path: Path) -> None
     assert said.startswith("all: never finished\n")
 
 
+def test_attachments_beyond_a_size_are_passed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = raw(tmp_path / "run.mcap", map(to_line, every_kind()), name="trees/mine.yaml")
+    assert "tree files mine.yaml" in whole(path)
+    monkeypatch.setattr(reading, "MOST_BYTES", 10)
+    assert "tree files" not in whole(path)
+    assert "1 damaged messages were passed over" in whole(path)
+
+
+def test_goals_that_never_end_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    events = every_kind()
+    goal = next(each for each in events if isinstance(each, GoalChanged))
+    more = [replace(goal, goal_id=f"{number:032x}") for number in range(60)]
+    path = raw(tmp_path / "run.mcap", map(to_line, [*events[:3], *more]))
+    assert whole(path).startswith("all: never finished")
+    monkeypatch.setattr(reading, "MOST_NAMES", 50)
+    assert "more names than a run can have" in whole(path)
+
+
 NASTY = "\x1b[31mred\x9b\u202e\n```\n# head <img src=x> `code`"
 
 
@@ -189,3 +212,24 @@ def test_an_attachment_is_written_nowhere(
     assert capsys.readouterr().out.startswith("all: ")
     assert sorted(tmp_path.rglob("*")) == sorted([*before, folder / "x.md"])
     assert not Path("/tmp/escaped.yaml").exists()
+
+
+@pytest.mark.parametrize("extreme", EXTREMES, ids=range(len(EXTREMES)))
+def test_no_summary_makes_more_than_a_line_that_fits(
+    tmp_path: Path, extreme: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from bt_actions.cli import main
+
+    first = record(every_kind())
+    summary = json.loads(summary_of(first).read_text())
+    for key in summary:
+        summary_of(first).write_text(json.dumps(summary | {key: extreme}))
+        assert main(["runs"]) == 0
+        out = capsys.readouterr().out
+        assert out.count("\n") == 2
+        assert max(map(len, out.splitlines())) <= 200
+        assert out.replace("\n", "").isprintable()
+        assert main(["runs", "--json"]) == 0
+        assert len(json.loads(capsys.readouterr().out)) == 12
+    summary_of(first).write_text(json.dumps(extreme))
+    assert main(["runs"]) == 0

@@ -137,7 +137,7 @@ def _row(run: Recorded) -> tuple[str, str, str, str, str, str]:
     when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(summary.began))
     word = "STOPPED" if summary.status == "INVALID" else summary.status
     status = word or ("goes on" if run.is_written else "never finished")
-    seconds = "" if summary.seconds is None else f"{summary.seconds:.2f}"
+    seconds = "" if summary.seconds is None else fit(f"{summary.seconds:.2f}", 12)
     cause = summary.cause or summary.stopped_by
     return summary.run_id[:8], when, fit(summary.tree, 30), fit(status, 14), seconds, cause
 
