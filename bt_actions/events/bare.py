@@ -1,7 +1,8 @@
 """Events without the values that a robot moved by: for those who may know the story alone.
 
 What stays is which node did what, when, and with which outcome. Goals, results, feedback,
-variables, items, inputs and outputs go, and of each text what may hold values: see `said`.
+variables, items, inputs and outputs go, and of each text what may hold values: see `said`. Of what
+nodes say only the outcomes of actions stay: a leaf of the user's may say anything.
 """
 
 from __future__ import annotations
@@ -26,7 +27,9 @@ from bt_actions.events.kinds import (
     VariableWritten,
 )
 from bt_actions.events.snapshot import HIDDEN
+from bt_actions.goals.policy import Outcome
 
+_OUTCOMES = frozenset(each.value for each in Outcome)
 _SETTINGS = ("timeouts", "attempts", "memory", "constants")
 """Of a node: those that are no values of the robot's."""
 
@@ -41,6 +44,12 @@ def said(text: str) -> str:
     """Return a text up to its first value; all that a server or a user's node says is value."""
     head = text.partition("{")[0]
     return head.partition(": ")[0].rstrip(" ;,:").removesuffix("; goal")
+
+
+def outcome_of(message: str) -> str:
+    """Return of a node's message what an action says of its outcome: all else may be value."""
+    head = said(message)
+    return head if head.partition(" ")[0].rstrip(",") in _OUTCOMES else ""
 
 
 def bare_node(node: Node) -> Node:
@@ -67,9 +76,7 @@ _STRIPPED: dict[type[Event], Callable[[Any], Event | None]] = {
         event, nodes=tuple(map(bare_node, event.nodes)), inputs=_hidden(event.inputs), sources={}
     ),
     NodesAdded: lambda event: replace(event, nodes=tuple(map(bare_node, event.nodes))),
-    NodeChanged: lambda event: replace(
-        event, message=said(event.message), warning=said(event.warning)
-    ),
+    NodeChanged: lambda event: replace(event, message=outcome_of(event.message), warning=""),
     GoalChanged: _goal,
     AttemptEnded: lambda event: replace(event, reason=said(event.reason), seen={}),
     FeedbackCame: lambda event: None,
@@ -80,7 +87,7 @@ _STRIPPED: dict[type[Event], Callable[[Any], Event | None]] = {
     RunEnded: lambda event: replace(
         event,
         world="",
-        complaint=said(event.complaint),
+        complaint=HIDDEN if event.complaint else "",
         error=said(event.error),
         unaccounted=tuple(map(said, event.unaccounted)),
     ),

@@ -6,12 +6,12 @@ import dataclasses
 from collections import deque
 from typing import Any
 
-from bt_actions.events.bare import bare, bare_node, said
+from bt_actions.events.bare import bare, bare_node, outcome_of, said
 from bt_actions.events.kinds import Event, Moment, Node
-from bt_actions.story.state import State
+from bt_actions.story.state import State, Warned
 
-_TEXTS = ("message", "warning", "reason")
-"""Fields of a state's parts that may hold values behind their first words."""
+_TEXTS = {"message": outcome_of, "warning": lambda text: "", "reason": said}
+"""Fields of a state's parts that may hold values, and what stays of each."""
 _VALUES = ("goal", "result")
 
 
@@ -40,6 +40,8 @@ class _Stripping:
             return bare(held)
         if isinstance(held, Node):
             return bare_node(held)
+        if isinstance(held, Warned):
+            return None
         if isinstance(held, dict):
             return {key: new for key, each in held.items() if (new := self.of(each)) is not None}
         if isinstance(held, deque):
@@ -52,7 +54,7 @@ class _Stripping:
         for each in dataclasses.fields(held):
             value = getattr(held, each.name)
             if each.name in _TEXTS:
-                new[each.name] = said(value)
+                new[each.name] = _TEXTS[each.name](value)
             else:
                 new[each.name] = None if each.name in _VALUES else self.of(value)
         return dataclasses.replace(held, **new)  # type: ignore[type-var]  # an object, no class

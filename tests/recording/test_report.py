@@ -22,9 +22,12 @@ from bt_actions.events import (
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.recording import report as module
 from bt_actions.recording.report import markdown, reports, text
+from bt_actions.story.bare import stripped
+from bt_actions.story.keeping import to_json
 from bt_actions.story.why import why
 from bt_actions.testing import Simulation, VirtualNetwork, VirtualRunner
-from tests.support.recordings import record
+from tests.support.recordings import bytes_of, record
+from tests.support.stories import state_of
 from tests.support.told_trees import FakeAction, FakeNode, Story
 
 NIGHT = "examples/night/night.yaml"
@@ -282,3 +285,33 @@ def test_without_values_a_report_holds_none_of_them(
         assert "ABORTED: aborted by /move_robot" in said
         assert "To the station  /move_robot       3 in 3 visits  SUCCEEDED" in said
         assert str(tmp_path) not in said
+
+
+def test_a_run_that_is_recorded_without_values_holds_none(
+    night: tuple[list[Event], VirtualRunner], tmp_path: Path
+) -> None:
+    first = record(night[0], tmp_path, values=False)
+    kept = b"".join(bytes_of(tmp_path))
+    assert not [value for value in VALUES if value in kept]
+    assert "ABORTED: aborted by /move_robot" in told(first)
+
+
+@pytest.mark.parametrize("message", ["lifted 3.125 kg", "for John", "{x: 1}", "went: far"])
+@pytest.mark.parametrize("options", [{}, {"size": 1, "files": 2}], ids=["short", "long"])
+def test_what_a_leaf_of_the_user_s_says_counts_as_value(
+    story: Story, leaf: FakeNode, message: str, options: dict[str, int], tmp_path: Path
+) -> None:
+    events = [
+        story.began,
+        story.node(leaf, Status.FAILURE, message),
+        story.node(leaf, Status.SUCCESS, message, warning=message),
+        story.node(story.root, Status.FAILURE, message),
+        story.finish(Status.FAILURE),
+        RunEnded(story._next(), 1, complaint=message),
+    ]
+    first = record(events, tmp_path, **options)
+    assert message in told(first)
+    assert "warning: " in told(first)
+    for said in (told(first, values=False), to_json(stripped(state_of(events)))):
+        assert message not in said
+        assert "warning: " not in said
