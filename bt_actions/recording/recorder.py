@@ -62,7 +62,6 @@ class Recorder:
         self._runs: list[_Run] = []
         self._lock = threading.Lock()
         self._batches = Batches("recorder", self._step)
-        self._pruned = wish.first is not None
 
     def record(self, stream: Stream, tick: Callable[[], float | None]) -> _Run:
         """Record what happens from now on in a run, until its RunEnded.
@@ -86,9 +85,6 @@ class Recorder:
         for run in list(self._runs):
             if run.step(time.monotonic(), last=last):
                 self._let_go(run)
-        if not last and not self._pruned:
-            self._pruned = True
-            prune(self._wish.where)
 
     def _let_go(self, run: _Run) -> None:
         with self._lock:
@@ -96,6 +92,8 @@ class Recorder:
         if run.first is not None:
             with contextlib.suppress(OSError):
                 finish_beside(run.first, may_wait=not self._runs)
+        if self._wish.first is None:
+            prune(self._wish.where)
 
     def _tell(self, text: str) -> None:
         with contextlib.suppress(Exception):  # a log that is closed

@@ -25,7 +25,7 @@ from bt_actions.events import (
 )
 from bt_actions.events.stream import Stream
 from bt_actions.recording.finishing import is_finished
-from bt_actions.recording.folders import is_written, read_summary, recorded
+from bt_actions.recording.folders import SUCCEEDED, is_written, read_summary, recorded
 from bt_actions.recording.reading import Recording
 from bt_actions.recording.recorder import BEAT, Recorder, Wish
 from tests.support.every_kind import NODES, RUN_ID
@@ -154,6 +154,18 @@ def test_the_log_s_time_never_goes_back_though_the_clock_does(
     times = [each.log_time for each in found]
     assert times == sorted(times)
     assert found[0].publish_time - found[-1].publish_time > 3590 * 10**9
+
+
+def test_a_process_of_many_runs_keeps_the_last_of_them(recorder: Recorder, tmp_path: Path) -> None:
+    for number in range(SUCCEEDED + 5):
+        stream = Stream(Clock())
+        recorder.record(stream, lambda: None)
+        begin(stream, f"{number:032x}"[::-1], f"tree{number}")
+        end(stream)
+        until(lambda stream=stream: not stream.is_read)
+    recorder.close()
+    kept = {run.summary.tree for run in recorded(tmp_path)}
+    assert kept == {f"tree{number}" for number in range(5, SUCCEEDED + 5)}
 
 
 def test_a_folder_that_cannot_be_made_is_said_once(tmp_path: Path, said: list[str]) -> None:
