@@ -16,6 +16,7 @@ from bt_actions.events import Event, GoalChanged, Moment, RunEnded
 from bt_actions.recording import finishing
 from bt_actions.recording.finishing import is_finished
 from bt_actions.recording.folders import held, home, summary_of
+from bt_actions.recording.reading import Recording
 from tests.cli.conftest import Start
 from tests.support.processes import Process
 from tests.support.recordings import bytes_of, record
@@ -303,12 +304,19 @@ def test_a_secret_is_in_no_file_of_a_recording(start: Start, tmp_path: Path, cap
 tree: door
 inputs:
   pin: {type: string, secret: true}
+  code: {type: string, default: "CODE-é-4712", secret: true, description: of the door}
+  word:
+    secret: true
+    type: string
+    default: >
+      WORD-4713 and
+      WORD-4714
   floor: {type: string}
 root:
   sequence: Door
   children:
-    - set: {code: = $pin + '!', where: $floor}
-    - check: $code == 'nothing'
+    - set: {made: = $pin + '!', where: $floor}
+    - check: $made == 'nothing'
 """,
         encoding="utf-8",
     )
@@ -317,7 +325,11 @@ root:
     (first,) = recordings()
     kept = list(bytes_of(first.parent))
     assert any(b"third-0815" in each for each in kept)
-    assert not any(SECRET.encode() in each for each in kept)
+    for secret in (SECRET, "CODE-", "WORD-"):
+        assert not any(secret.encode() in each for each in kept)
+    [text] = Recording(first).state().began.sources.values()  # type: ignore[union-attr]
+    assert "description: of the door}" in text
+    assert len(text.splitlines()) == len(tree.read_text().splitlines())
     main(["report", "-o", str(tmp_path / "x.json"), "--full"])
     main(["report", "-o", str(tmp_path / "x.md"), "--full"])
     for path in (tmp_path / "x.json", tmp_path / "x.md"):

@@ -25,6 +25,8 @@ MAX_TREE_NODES = 1_000_000
 MAX_LEVELS = 200
 """Nodes inside each other after all that a tree includes was unfolded: py_trees ticks and stops a
 tree by recursion, and Python has 1,000 levels of that for everything."""
+_HIDDEN = "•••"
+"""In place of a secret, as in events."""
 _SUBTREE = KINDS["subtree"]
 _MAX_CHAIN = 50
 _MAX_FILES = 2 * _MAX_CHAIN
@@ -68,8 +70,18 @@ class Workspace:
 
     @property
     def files(self) -> dict[Path, str]:
-        """Every file that was read, as it was named, with its text; that of data files is empty."""
+        """Every file that was read, as it was named, with its text; that of data files is empty.
+
+        Nobody is told the defaults of secret inputs: what else stands there keeps its line.
+        """
         found = {each.path: each.text for each in self._sources if each.path}
+        for document in self.documents:
+            for declared in reversed(document.inputs.values()):
+                if declared.values.get("secret") is True and "default" in declared.parts:
+                    path, node = document.source.path, declared.parts["default"]
+                    if path in found:
+                        begin, end = node.begin.index, node.end.index
+                        found[path] = _blanked(found[path], begin, end)
         return found | {path: "" for each in self._sources for path in each.files}
 
     @property
@@ -254,3 +266,9 @@ def _shown(path: Path, source: Source) -> str:
         except ValueError:
             return str(path)
     return str(path)
+
+
+def _blanked(text: str, begin: int, end: int) -> str:
+    """The text without what stands between two of its characters, but for the ends of lines."""
+    lines = text[begin:end].count("\n")
+    return f"{text[:begin]}{_HIDDEN}{chr(10) * lines}{text[end:]}"
