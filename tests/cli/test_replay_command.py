@@ -14,6 +14,7 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
+from py_trees.common import Status
 
 from bt_actions.cli.commands import replay as command
 from bt_actions.cli.driving.player import Player
@@ -22,6 +23,7 @@ from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.lines import LineView
 from bt_actions.cli.views.played import PlayedView
 from bt_actions.events import Event, RunBegan
+from bt_actions.goals.policy import Outcome
 from bt_actions.recording.folders import held
 from bt_actions.recording.reading import Recording
 from bt_actions.recording.tape import Tape
@@ -32,6 +34,7 @@ from tests.support.every_kind import every_kind
 from tests.support.recordings import record
 from tests.support.stories import state_of
 from tests.support.terminal import ROWS, Terminal
+from tests.support.told_trees import FakeAction, FakeNode, Story
 from tests.support.virtual_runs import NIGHT, run_of
 
 
@@ -191,6 +194,7 @@ def test_the_run_of_a_killed_process_ends_where_its_recording_does(
     assert main(["replay", str(first)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "the recording ends here: its process was killed" in lines
+    assert any(line.startswith("NOT FINISHED after ") for line in lines)
     with held(first):
         assert main(["replay", str(first)]) == 0
     assert "the recording ends here: the run goes on\n" in capsys.readouterr().out
@@ -220,6 +224,24 @@ def test_events_that_are_missing_are_told_and_what_follows_is_shown(
     assert told[-1]["event"] == "finished"
     assert len(told[-1]["dealt_with"]) == len(state_of(events).dealt_with)
     assert sum("are missing here" in each.get("text", "") for each in told) == 1
+
+
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_what_only_damaged_events_explain_is_passed_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: tuple[str, ...]
+) -> None:
+    leaf, stranger = FakeAction("Move"), FakeNode("Stranger", id=99)
+    story = Story(FakeNode("Root", [leaf]))
+    unheard = [
+        story.verdict(leaf, Outcome.ABORTED, "of a goal that nobody heard of"),
+        story.node(stranger, Status.FAILURE),
+        story.goal(stranger, "EXECUTING"),
+    ]
+    first = record([story.began, *unheard, *story.fail(leaf, "a fault")], tmp_path)
+    assert main(["replay", str(first), *options]) == 0
+    out = capsys.readouterr().out
+    assert "FAILURE" in out
+    assert "Stranger" not in out
 
 
 def test_a_run_that_is_not_there_or_cannot_be_read_is_bad_input(

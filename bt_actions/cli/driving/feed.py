@@ -35,10 +35,12 @@ class Feed:
         """Whether it was said what is waited for."""
 
     def event(self, event: Event) -> None:
-        """Take in an event, and show it."""
+        """Take in an event, and show it, unless its node is not known: it is damaged, or late."""
         self._pass(event.at.steady)
         self.state.observe(event)
-        self._show(partial(self.view.event, event))
+        node = getattr(event, "node", None)
+        if node is None or node in self.state.nodes:
+            self._show(partial(self.view.event, event))
 
     def frame(self, now: float) -> None:
         """Show how things stand at `now`, on the steady clock."""

@@ -118,8 +118,9 @@ class LineView(View):
 
     def _attempt(self, event: AttemptEnded) -> None:
         action = self._state.action(event.node)
-        if event.outcome is not Outcome.SUCCEEDED:
-            text = _which(action, event) + attempt_text(action, action.goals[event.goal_id])
+        goal = action.goals.get(event.goal_id)  # None where its events are damaged
+        if event.outcome is not Outcome.SUCCEEDED and goal is not None:
+            text = _which(action, event) + attempt_text(action, goal)
             again = f"; again in {event.again_in:.1f} s" if event.again_in else ""
             self._line(event.at.steady, "goal", event.node, text + again)
 
