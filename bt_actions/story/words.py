@@ -41,6 +41,13 @@ def verdict(status: Status, seconds: float | None) -> str:
     return word if seconds is None else f"{word} after {seconds:.2f} s"
 
 
+def verdict_on(state: State) -> str:
+    """Say how a run has ended; of what was left of a run that it has not."""
+    if state.finished is None and state.ended is None:
+        return f"NOT FINISHED after {state.elapsed:.2f} s"
+    return verdict(state.status, state.elapsed)
+
+
 def last_words(state: State, width: int = MESSAGE) -> list[str]:
     """Return the table, the verdict, how long it took, and last what went wrong."""
     ended = state.ended or _NOTHING
@@ -51,7 +58,7 @@ def last_words(state: State, width: int = MESSAGE) -> list[str]:
         action_table(state, width),
         outputs_lines(state.outputs),
         [ended.world] if ended.world else [],
-        [f"{verdict(state.status, state.elapsed)}{cause}"],
+        [f"{verdict_on(state)}{cause}"],
         troubles(state),
     )
 

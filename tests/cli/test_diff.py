@@ -147,7 +147,7 @@ def test_a_run_of_a_killed_process_did_nothing_more(
     killed = record(changed(night, run_id="a" * 32)[:100], tmp_path, killed=0.0)
     assert main(["diff", recorded(night), str(killed)]) == 1
     lines = lines_of(capsys)
-    assert "  not finished after " in lines[1]
+    assert "  NOT FINISHED after " in lines[1]
     assert lines[-1] == "  B  nothing more there"
 
 

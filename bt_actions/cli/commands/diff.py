@@ -90,14 +90,12 @@ def _began(walk: Walk) -> RunBegan:
 
 
 def _head(letter: str, walk: Walk) -> str:
+    from bt_actions.story.words import verdict_on
+
     state, began = walk.state, _began(walk)
     when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began.at.wall))
-    word = "not finished"
-    if state.finished is not None:
-        word = "STOPPED" if state.status.value == "INVALID" else state.status.value
     lost = f"; {walk.lost} events are not in the recording" if walk.lost else ""
-    verdict = f"{word} after {state.elapsed:.2f} s{lost}"
-    return "  ".join((letter, began.run_id[:8], began.tree, when, verdict))
+    return "  ".join((letter, began.run_id[:8], began.tree, when, verdict_on(state) + lost))
 
 
 def _inputs(a: RunBegan, b: RunBegan) -> Iterator[str]:
