@@ -35,6 +35,7 @@ _NO_STATE = (
     RecursionError,
 )
 """What a text raises that is no state."""
+_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 _Writer = Callable[[Any, "_Objects"], Any]
 _Reader = Callable[[Any, list[Any]], Any]
 
@@ -43,9 +44,8 @@ def to_json(state: State) -> str:
     """Return a state as one line of JSON."""
     objects = _Objects()
     data = _codec(State)[0](state, objects)
-    return json.dumps(
-        {"objects": objects.written, "state": data}, separators=(",", ":"), allow_nan=False
-    )
+    pieces = _ENCODER.iterencode({"objects": objects.written, "state": data})
+    return "".join(pieces)  # json.dumps would keep Python's lock throughout: a tick may want it
 
 
 def from_json(text: str) -> State:
