@@ -4,14 +4,16 @@ While `bt-actions run` or `bt-actions serve` runs in another terminal:
     python examples/watch_runs.py /bt_actions_serve
 """
 
+import contextlib
 import sys
 
 import rclpy
 from bt_actions_interfaces.msg import RunEvent, RunStates
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
-from bt_actions.events import RunEnded, TreeFinished, from_line
+from bt_actions.events import TreeFinished, from_line
 from bt_actions.story.keeping import from_json
 from bt_actions.story.state import State
 from bt_actions.story.why import why
@@ -32,22 +34,24 @@ class Watcher:
         node.create_subscription(RunStates, f"{watched}/tree", self.states, latched)
 
     def event(self, message: RunEvent) -> None:
-        """Take in an event that follows the one before, and keep any other."""
+        """Take in an event that follows the one before, and keep one that does not."""
         run = bytes(message.run_id).hex()
-        known = self._numbers.get(run)
-        if known is None or message.number > known + 1:
+        known = self._numbers.get(run, 0)
+        if message.number > known + 1:
             self._ahead.setdefault(run, []).append(message)
         elif message.number == known + 1:
             self._numbers[run] = message.number
+            state = self.runs.setdefault(run, State())
             if message.data:  # else its values are for nobody
-                self.runs[run].observe(from_line(message.data))
+                state.observe(from_line(message.data))
             self.follows(run, message)
 
     def states(self, message: RunStates) -> None:
-        """Take in how the runs stand, and what has happened since."""
+        """Take in how those runs stand of which events are missing, and what has happened since."""
         for each in message.runs:
             run = bytes(each.run_id).hex()
-            if each.number > self._numbers.get(run, -1):
+            known = self._numbers.get(run, 0)
+            if each.number > known and (run in self._ahead or not known):
                 self._numbers[run], self.runs[run] = each.number, from_json(each.data)
                 for waiting in self._ahead.pop(run, []):
                     self.event(waiting)
@@ -57,7 +61,7 @@ class Watcher:
         state = self.runs[run]
         node = state.nodes.get(message.node)
         print(f"{run[:6]} {message.number:5} {message.kind}", node.node.name if node else "")
-        if message.kind in (TreeFinished.__name__, RunEnded.__name__):
+        if message.kind == TreeFinished.__name__:
             print(*why(state), sep="\n")
 
 
@@ -66,7 +70,8 @@ def main(watched: str) -> None:
     rclpy.init()
     node = rclpy.create_node("watch_runs")
     Watcher(node, watched)
-    rclpy.spin(node)
+    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
+        rclpy.spin(node)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import signal
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +17,7 @@ from bt_actions.events import RunEnded
 from bt_actions.serving import TreeServer
 from tests.serving.conftest import Serve
 from tests.support.listener import Listener
-from tests.support.processes import Journal
+from tests.support.processes import Journal, Process
 from tests.support.tree_client import Sent, TreeClient
 from tests.support.waiting import until
 
@@ -75,6 +76,29 @@ def test_two_runs_of_one_server_are_told_apart(
         numbers = [each.number for each in listener.events if bytes(each.run_id).hex() == run_id]
         assert numbers == list(range(1, len(numbers) + 1))
     client.until(lambda: len(listener.trees[-1].runs) == 1, "the latest stays")
+
+
+def test_the_example_tells_of_each_event_and_why_a_run_has_failed(
+    start_program: Callable[..., Process],
+    serve_trees: Serve,
+    client: TreeClient,
+    folder: Path,
+    space: str,
+) -> None:
+    (folder / "fails.yaml").write_text("tree: fails\nroot: {failure: No luck}\n")
+    serve_trees()
+    watching = start_program("-u", "examples/watch_runs.py", f"{space}/bt_actions_serve")
+
+    def has_heard() -> bool:
+        client.told(client.send("fails"))
+        return any("RunEnded" in line for line in watching.lines)
+
+    client.until(has_heard, "an end is told")
+    watching.line("NodeChanged No luck")
+    watching.line("failed: failure")
+    watching.send(signal.SIGINT)
+    assert watching.wait() == 0, watching
+    assert not watching.errors, watching
 
 
 def test_the_topics_go_with_the_server(new_node: Callable[[str], Node], folder: Path) -> None:
