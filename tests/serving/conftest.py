@@ -29,7 +29,7 @@ root:
       type: robot_control_interfaces/action/MoveRobot
       server: {server}
       goal: {{distance: $distance}}
-      timeout: {{result: 60 s, cancel: {cancel}}}
+      timeout: {{queue: 60 s, result: 60 s, cancel: {cancel}}}
       save: {{at: result.final_pose}}
     - {{success: Done}}
 """

@@ -19,7 +19,7 @@ from tests.support.tree_client import Sent, TreeClient
 from tests.support.waiting import until
 
 R = RunTree.Result
-LONG = "{distance: 20.0}"
+LONG = "{distance: 60.0}"
 PAUSE, RESUME, HALT = (
     ControlTree.Request.PAUSE,
     ControlTree.Request.RESUME,
