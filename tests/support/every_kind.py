@@ -51,7 +51,7 @@ def every_kind(rounds: int = 1) -> list[Event]:
 
     def tell(kind: Any, *fields: Any, **more: Any) -> None:
         number = next(numbers)
-        at = Moment(number, 100.0 + number / 8, 1.8e9 + number / 8, number / 4)
+        at = Moment(number, 100.0 + number / 8, 1.8e9 + number / 16, number / 4)
         events.append(kind(at, *fields, **more))
 
     tell(ServerSeen, "/move", True)
