@@ -79,8 +79,7 @@ class Stream:
     """Takes events from any thread."""
 
     def __init__(self, clock: Clock) -> None:
-        self.clock = clock
-        """The steady, the wall and the ROS clock, in seconds."""
+        self._clock = clock
         self._lock = threading.Lock()
         self._readers: tuple[Reader, ...] = ()
         self._number = 0
@@ -118,10 +117,15 @@ class Stream:
         if not self._readers:
             return
         with self._lock:
-            now = self.clock()
+            now = self._clock()
             for jump in self._jumps(now):
                 self._give(ClockJumped(self._moment(now), *jump))
             self._give(kind(self._moment(now), *args, **fields))
+
+    def now(self) -> tuple[float, float, float]:
+        """Return this moment on all clocks; the readers have all events before it."""
+        with self._lock:
+            return self._clock()
 
     def _moment(self, now: tuple[float, float, float]) -> Moment:
         self._number += 1

@@ -115,6 +115,8 @@ class _Run:
         self._wish, self._say = wish, say
         self._early: list[Event] = []
         """What came before the run began."""
+        self._later: list[Event] = []
+        """What came while the step before was at it: a heartbeat stands before it."""
         self._writer: RunWriter | None = None
         self._locks = contextlib.ExitStack()
         self._beat = 0.0
@@ -122,9 +124,11 @@ class _Run:
         """The first file, once the run has begun."""
 
     def step(self, now: float, *, last: bool) -> bool:
-        """Write what has come; return whether nothing more comes."""
-        done = last
-        for event in self._reader.take():
+        """Write what has come until now; return whether nothing more comes."""
+        done, at = last, self._stream.now()
+        events = [*self._later, *self._reader.take()]
+        self._later = [each for each in events if each.at.steady > at[0] and not last]
+        for event in events[: len(events) - len(self._later)]:
             if isinstance(event, RunBegan) and self._writer is None and not self._begin(event):
                 done = True
                 break
@@ -134,8 +138,7 @@ class _Run:
         writer = self._writer
         if writer is not None:
             if now - self._beat >= BEAT and not done:
-                self._beat = now
-                began, at = self._tick(), self._stream.clock()
+                self._beat, began = now, self._tick()
                 writer.beat(*at, 0.0 if began is None else max(0.0, at[0] - began))
             writer.flush()
             done = done or bool(writer.failed)
