@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 from bt_actions.events import EventsLost
@@ -37,13 +38,16 @@ class Follower:
 
         Raises OSError, and ValueError for a file that is none of ours.
         """
-        found: list[Item] = []
+        return list(self.news())
+
+    def news(self) -> Iterator[Item]:
+        """Yield the same, for a reader who takes all of it: one file at most is held in memory."""
         while True:
-            found += self._more()
+            yield from self._more()
             parts = parts_of(self.recording.first)
             later = [each for each in parts if parts.index(each) > self._place(parts)]
             if not later:
-                return found
+                return
             self._turn_to(later[0])
 
     def close(self) -> None:
@@ -63,11 +67,11 @@ class Follower:
     def _turn_to(self, part: Path) -> None:
         self._part, self._at, self._inode = part, 0, 0
 
-    def _more(self) -> list[Item]:
+    def _more(self) -> Iterator[Item]:
         try:
             file = self._part.open("rb")
         except FileNotFoundError:  # the oldest of a long run are removed
-            return []
+            return
         with file:
             inode = os.fstat(file.fileno()).st_ino
             if inode != self._inode:
@@ -77,11 +81,11 @@ class Follower:
             data = file.read()
         length = whole_length(data)
         if not length:
-            return []
+            return
         head = b"" if self._at == 0 else MAGIC
         self._at += length
         items = self.recording.items_in(io.BytesIO(head + data[:length]))
-        return [item for item in items if self._is_new(item)]
+        yield from (item for item in items if self._is_new(item))
 
     def _is_new(self, item: Item) -> bool:
         at = item.now if isinstance(item, State) else item.at
