@@ -82,7 +82,7 @@ $(VENV)/interfaces.stamp: $(INTERFACES) | python
 	@touch $@
 
 $(VENV)/runtime.stamp: $(VENV)/interfaces.stamp constraints.txt $(PROJECT) | python
-	@scripts/pip.sh $(VENV) "Installing ROS 2 Jazzy and bt_actions" install --editable .
+	@scripts/pip.sh $(VENV) "Installing ROS 2 Jazzy and bt_actions" install --editable '.[view]'
 	@touch $@
 
 $(VENV)/dev.stamp: setup.cfg constraints.txt | $(VENV)/runtime.stamp
