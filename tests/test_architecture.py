@@ -18,7 +18,7 @@ from bt_actions import traffic
 ROOT = Path(bt_actions.__file__).parent
 ROOMS = [
     {"cli"},
-    {"serving", "testing"},
+    {"page", "serving", "testing"},
     {"recording", "render", "running", "simulation"},
     {"document"},
     {"behaviours"},

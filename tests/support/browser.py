@@ -51,10 +51,10 @@ class Browser:
     def __init__(self, session: str) -> None:
         self._session = session
 
-    def open(self, path: Path, width: int = 1200, height: int = 800) -> None:
-        """Show a file, in a window of so many pixels inside."""
+    def open(self, path: Path | str, width: int = 1200, height: int = 800) -> None:
+        """Show a file or an address, in a window of so many pixels inside."""
         self.resize(width, height)
-        _call(f"{self._session}/url", url=path.as_uri())
+        _call(f"{self._session}/url", url=path if isinstance(path, str) else path.as_uri())
 
     def resize(self, width: int, height: int) -> None:
         """Give the window so many pixels inside."""

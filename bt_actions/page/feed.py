@@ -1,0 +1,181 @@
+"""What a browser is told of a run: its events in batches, then what comes, and a heartbeat.
+
+The files of the run are the only store: each browser has a place of its own in them, and is told no
+faster than it takes. So a browser that stops reading costs one batch of memory, and resumes by the
+number of the last event that it has.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from bt_actions.events import (
+    Event,
+    EventsLost,
+    NodeChanged,
+    NodesAdded,
+    RunEnded,
+)
+from bt_actions.events.wire import to_plain
+from bt_actions.recording.folders import is_written
+from bt_actions.recording.following import Follower
+from bt_actions.story.actions import GoalStory
+from bt_actions.story.state import Failure, State
+
+MOST = 500
+"""Events of one message."""
+POLL = 0.04
+"""Seconds between two looks at a run that goes on."""
+BEAT = 1.0
+"""Seconds between two heartbeats to a browser."""
+
+
+def message(kind: str, data: object, number: str = "") -> bytes:
+    """Return one server-sent event."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    head = f"id: {number}\n" if number else ""
+    return f"{head}event: {kind}\ndata: {text}\n\n".encode()
+
+
+async def told(
+    first: Path, run_id: str, after: int, closing: Callable[[], bool]
+) -> AsyncIterator[bytes]:
+    """Yield what a browser is told of a run behind the event `after`, until the run is over.
+
+    Raises OSError, and ValueError for a file that is none of ours.
+    """
+    with Follower(first) as follower:
+        feed = _Feed(follower, after)
+        beat, gone = 0.0, 0
+        while not closing():
+            now = time.monotonic()
+            is_due = now - beat >= BEAT
+            if is_due:
+                beat = now
+                gone = 0 if await asyncio.to_thread(is_written, first) else gone + 1
+            sent = False
+            for_one = feed.batches()
+            while (batch := await asyncio.to_thread(next, for_one, None)) is not None:
+                yield message("events", batch, f"{run_id}:{batch['to']}")
+                sent = True
+                if closing():
+                    return
+            if is_due:
+                yield message("beat", feed.beat(is_written=not gone))
+            # A run that is beginning has its file for a moment before its lock.
+            if not sent and gone and (feed.ended or gone > 1):
+                yield message("end", {"to": feed.number, "ended": feed.ended})
+                return
+            await asyncio.sleep(POLL)
+
+
+class _Feed:
+    """One browser's place in a run."""
+
+    def __init__(self, follower: Follower, after: int) -> None:
+        self._follower = follower
+        self.number = after
+        """Of the latest event that the browser was told."""
+        self.ended = False
+        """Whether the run was told to be over."""
+
+    def beat(self, *, is_written: bool) -> dict[str, Any]:
+        """Return what is known of the run's process."""
+        recording = self._follower.recording
+        return {"clock": recording.last_beat, "tick": recording.tick, "written": is_written}
+
+    def batches(self) -> Iterator[dict[str, Any]]:
+        """Yield what has come since the last look, each with the numbers that it covers."""
+        events: list[dict[str, Any]] = []
+        last = self.number
+        for item in self._follower.news():
+            self.ended = self.ended or isinstance(item, RunEnded)
+            at = item.now if isinstance(item, State) else item.at
+            if at is None or at.number <= self.number or isinstance(item, EventsLost):
+                continue
+            events.append(known(item) if isinstance(item, State) else to_plain(item))
+            last = at.number
+            if len(events) >= MOST:
+                yield self._batch(events, last)
+                events = []
+        if events:
+            yield self._batch(events, last)
+
+    def _batch(self, events: list[dict[str, Any]], last: int) -> dict[str, Any]:
+        begins, self.number = self.number + 1, last
+        return {"from": begins, "to": last, "events": events}
+
+
+# A state, where the events that led to it are missing
+
+
+def known(state: State) -> dict[str, Any]:
+    """Return a state as one event for the page: it holds those that lead to what is known."""
+    assert state.now is not None
+    pending = {
+        number: [_failure(each) for each in story.pending]
+        for number, story in state.nodes.items()
+        if story.pending
+    }
+    return {
+        "kind": "StateKnown",
+        "at": list(state.now),
+        "nodes": list(state.nodes),
+        "events": [to_plain(event) for event in _leading_to(state)],
+        "pending": pending,
+        "dealt": [_failure(each) for each in state.dealt_with],
+    }
+
+
+def _failure(failure: Failure) -> dict[str, Any]:
+    by = failure.by.id if failure.by is not None else None
+    at = list(failure.at)
+    return {"node": failure.node.id, "at": at, "message": failure.message, "by": by}
+
+
+def _leading_to(state: State) -> Iterator[Event]:
+    assert state.began is not None
+    assert state.now is not None
+    nodes = tuple(story.node for story in state.nodes.values())
+    began = {node.id for node in state.began.nodes}
+    yield state.began
+    if added := tuple(node for node in nodes if node.id not in began):
+        yield NodesAdded(state.now, added)
+    for story in state.nodes.values():
+        if story.since is not None:
+            yield NodeChanged(
+                story.since,
+                story.node.id,
+                story.status,
+                story.message,
+                warning=story.warning,
+                due_in=story.due_in,
+            )
+        if story.round is not None:
+            yield story.round
+    yield from state.servers.values()
+    yield from state.variables.values()
+    for action in state.actions:
+        for goal in action.goals.values():
+            yield from _goal(goal)
+    for event in (state.stop, state.lasting, state.finished, state.ended):
+        if event is not None:
+            yield event
+
+
+def _goal(goal: GoalStory) -> Iterator[Event]:
+    begun = replace(goal.latest, at=goal.began, state="SENDING", outcome=None, goal=goal.goal)
+    yield replace(begun, result=None)
+    if goal.accepted is not None:
+        yield replace(begun, at=goal.accepted, state="EXECUTING", goal=None, result=None)
+    if goal.feedback is not None:
+        yield goal.feedback
+    yield replace(goal.latest, goal=goal.goal, result=goal.result)
+    if goal.verdict is not None:
+        yield goal.verdict

@@ -1,0 +1,66 @@
+// The shapes: what kind a node is (today's shapes and colours of `bt-actions render`), and how it stands.
+// A status never rests on colour alone: each has an outline of its own, and its word beside it.
+
+const NS = "http://www.w3.org/2000/svg";
+export const el = (name, attributes = {}, ...kids) => {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value === undefined || value === null || value === false) continue;
+    if (key === "text") made.textContent = value;
+    else if (key === "style") made.style.cssText = value;    // which the page's policy allows, unlike the attribute
+    else if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
+    else made.setAttribute(key, value === true ? "" : value);
+  }
+  made.append(...kids.flat().filter((kid) => kid !== null && kid !== undefined && kid !== false));
+  return made;
+};
+export const svg = (name, attributes = {}, ...kids) => {
+  const made = document.createElementNS(NS, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  made.append(...kids);
+  return made;
+};
+
+export const FILL = (node) => (node.server ? "action" : node.shape === "octagon" ? "fallback" : node.shape === "box" ? "sequence"
+  : node.shape === "parallelogram" ? "parallel" : node.children.length ? "decorator" : "leaf");
+const KIND = {
+  octagon: "M4.5 1.5h9l3 3v5l-3 3h-9l-3-3v-5z", box: "M1.5 1.5h15v11h-15z",
+  parallelogram: "M5.5 1.5h11l-4 11h-11z", ellipse: "M9 1.5c4.6 0 7.5 2.4 7.5 5.500s-2.900 5.500-7.500 5.500-7.500-2.400-7.500-5.500 2.900-5.500 7.500-5.500z",
+};
+const INSIDE = {
+  octagon: "M7.600 5.400a1.600 1.600 0 1 1 2.200 1.500c-.6.3-.8.5-.8 1.100M9 10v.2", box: "M5.500 7h6M9.500 5l2 2-2 2",
+  parallelogram: "M6 5.500h6M6 8.500h6",
+};
+export function kind_glyph(node) {
+  const made = svg("svg", { viewBox: "0 0 18 14", class: `kind k-${FILL(node)}`, "aria-hidden": "true" }, svg("path", { d: KIND[node.shape] }));
+  if (INSIDE[node.shape]) made.append(svg("path", { d: INSIDE[node.shape], class: "in" }));
+  return made;
+}
+
+const LOOK = {
+  idle: '<circle cx="7" cy="7" r="3.2" class="line"/>',
+  running: '<circle cx="7" cy="7" r="6.200" class="ring"/><path d="M5.300 3.800v6.400l5-3.200z" class="fill"/>',
+  waiting: '<path d="M3 1.500h8M3 12.500h8M4 1.800c0 2.600 1.200 3.800 3 5.200-1.800 1.400-3 2.600-3 5.200M10 1.800c0 2.600-1.200 3.800-3 5.200 1.800 1.400 3 2.600 3 5.200" class="line"/>',
+  backoff: '<path d="M2.600 5.200a5 5 0 1 1-.5 3M2.200 2v3.400h3.400M7 4.300v3l2 1.200" class="line"/>',
+  success: '<circle cx="7" cy="7" r="6.500" class="fill"/><path d="M4 7.200l2.200 2.200 3.900-4.400" class="cut"/>',
+  failure: '<rect x=".8" y=".8" width="12.400" height="12.400" rx="2" class="fill"/><path d="M4.300 4.300l5.400 5.400M9.700 4.300l-5.400 5.400" class="cut"/>',
+  stopped: '<circle cx="7" cy="7" r="5.700" class="line"/><path d="M3 11L11 3" class="line"/>',
+  cancel: '<path d="M4.400.8h5.200l3.600 3.600v5.200l-3.600 3.600H4.400L.8 9.600V4.400z" class="line"/><path d="M4.400 7h5.200" class="line"/>',
+};
+export const status_html = (look) => `<svg viewBox="0 0 14 14" class="st st-${look}" aria-hidden="true">${LOOK[look]}</svg>`;
+export function status_glyph(look) {
+  const holder = document.createElement("template");
+  holder.innerHTML = status_html(look);
+  return holder.content.firstChild;
+}
+export const ICON = {
+  play: '<svg viewBox="0 0 16 16"><path d="M4.500 2.500v11l9-5.500z"/></svg>',
+  pause: '<svg viewBox="0 0 16 16"><path d="M4 2.500h3v11H4zM9.500 2.500h3v11h-3z"/></svg>',
+  prev: '<svg viewBox="0 0 16 16"><path d="M3 3h2v10H3zM13 3v10L6 8z"/></svg>',
+  next: '<svg viewBox="0 0 16 16"><path d="M11 3h2v10h-2zM3 3v10l7-5z"/></svg>',
+  prev_fail: '<svg viewBox="0 0 20 16"><path d="M7 3v10L1 8z"/><rect x="9" y="3.500" width="9" height="9" rx="1.500"/><path class="cutout" d="M11.500 6l4 4M15.500 6l-4 4"/></svg>',
+  next_fail: '<svg viewBox="0 0 20 16"><path d="M13 3v10l6-5z"/><rect x="2" y="3.500" width="9" height="9" rx="1.500"/><path class="cutout" d="M4.500 6l4 4M8.500 6l-4 4"/></svg>',
+  sun: '<svg viewBox="0 0 16 16" class="stroke"><circle cx="8" cy="8" r="3"/><path d="M8 1v2M8 13v2M1 8h2M13 8h2M3 3l1.400 1.400M11.600 11.600L13 13M3 13l1.400-1.400M11.600 4.400L13 3"/></svg>',
+  moon: '<svg viewBox="0 0 16 16" class="stroke"><path d="M13.500 9.800A6 6 0 0 1 6.200 2.500a6 6 0 1 0 7.300 7.300z"/></svg>',
+  lock: '<svg viewBox="0 0 16 16" class="stroke"><rect x="3" y="7" width="10" height="7" rx="1.500"/><path d="M5 7V5a3 3 0 0 1 6 0v2"/></svg>',
+};

@@ -1,0 +1,88 @@
+// The top of the page: which run, how it stands, and the connection.
+
+import { el, status_glyph } from "./glyphs.js";
+import { clock, STATE } from "./words.js";
+
+const find = (id) => document.getElementById(id);
+const text = (node, value) => { if (node.textContent !== value) node.textContent = value; };
+const LOOK = { SUCCESS: "success", FAILURE: "failure", INVALID: "stopped" };
+export const look_of = (one) => (one.written && !one.status ? "running" : LOOK[one.status] || "stopped");
+const when = (wall) => new Date(wall * 1000).toLocaleString();
+
+export function create_head(app) {
+  // The switcher of runs.
+  const runs = find("runs"), opener = find("switch");
+  const shut = (focus) => { runs.hidden = true; opener.setAttribute("aria-expanded", "false"); if (focus) opener.focus(); };
+  opener.addEventListener("click", async () => {
+    if (!runs.hidden) return shut();
+    const all = await app.fetch_runs();
+    runs.replaceChildren(...all.slice(0, 30).map((one) => {
+      const option = el("button", { class: "opt", role: "option", "aria-selected": String(one.run_id === app.run.key), onclick: () => { shut(true); app.open(one.run_id); } });
+      option.append(status_glyph(look_of(one)), el("b", { text: one.tree }), el("span", { class: "num soft", text: one.seconds === null ? "" : clock(one.seconds) }),
+        el("span", { text: `${when(one.began)}  ·  ${one.run_id.slice(0, 8)}${one.cause ? `  ·  ${one.cause}` : ""}` }));
+      return option;
+    }));
+    runs.hidden = false;
+    opener.setAttribute("aria-expanded", "true");
+    (runs.querySelector("[aria-selected=true]") || runs.firstChild)?.focus();
+  });
+  runs.addEventListener("keydown", (event) => {
+    const options = [...runs.querySelectorAll(".opt")], at = options.indexOf(document.activeElement);
+    if (event.key === "Escape") shut(true);
+    if (event.key === "ArrowDown") options[Math.min(at + 1, options.length - 1)].focus();
+    if (event.key === "ArrowUp") options[Math.max(at - 1, 0)].focus();
+    if (event.key.startsWith("Arrow")) event.preventDefault();
+    event.stopPropagation();
+  });
+  document.addEventListener("pointerdown", (event) => { if (!runs.hidden && !event.target.closest(".switch")) shut(); });
+
+  // The status of the run at the time that is shown, as far as that is known.
+  function standing() {
+    const { run, s, link } = app, over = run.over && app.at_head;
+    if (s.finished) return { SUCCESS: STATE.success, FAILURE: STATE.failure, INVALID: ["Stopped", "stopped"] }[s.finished.status];
+    if (over && !link.ended) return ["Never finished", "stopped"];
+    if (s.paused) return ["Paused", "waiting"];
+    if (s.stop) return ["Stopping", "cancel"];
+    if (app.at_head && link.conn === "lost") return ["Was running", "running"];
+    return STATE[s.status[0] || "idle"];
+  }
+
+  function update() {
+    const { run, link } = app, { info } = run, small = app.narrow.matches;
+    text(find("tree-name"), info.tree || "…");
+    text(find("tree-where"), info.wall ? `${when(info.wall)}  ·  run ${info.id.slice(0, 8)}` : "");
+    const [word, look] = standing(), pill = find("status"), key = word + look;
+    if (pill.dataset.k !== key) {
+      pill.dataset.k = key;
+      pill.className = `pill tone-${look}`;
+      pill.replaceChildren(status_glyph(look), el("span", { text: word }));
+      document.title = `${word}: ${info.tree}`;
+    }
+    text(find("elapsed"), clock(app.t));
+    const conn = find("conn"), ago = Math.floor(link.silence), of = small ? "" : "for ", { conn: now } = link;
+    if (conn.dataset.conn !== now) { conn.dataset.conn = now; conn.replaceChildren(el("i"), el("span")); document.body.dataset.conn = now; }
+    text(conn.lastChild, { live: "Live", stale: `Stale ${of}${ago} s`, lost: `Lost ${of}${ago} s`, replay: "Replay" }[now]);
+    conn.title = { live: "Events come", stale: "Nothing has come from the run, not even a heartbeat", lost: "The connection is gone; what is shown is what was last known", replay: "Nothing more comes; this is the record" }[now];
+    banner(now, ago);
+  }
+
+  function banner(now, ago) {
+    const { run, link } = app, box = find("banner");
+    const killed = now === "replay" && !link.ended && run.began ? "killed" : "", broken = link.why ? "lost" : "";
+    const tone = broken || (killed ? "stale" : now === "stale" || now === "lost" ? now : "");
+    if (box.dataset.k !== tone + now) {
+      box.dataset.k = tone + now;
+      box.className = tone;
+      box.replaceChildren(...(tone ? [el("span", { class: "num" })] : []), ...(now === "lost" ? [el("button", { text: "Try now", onclick: () => link.open() })] : []));
+    }
+    if (!tone) return;
+    const last = `As of ${clock(run.clock)}`, next = Math.max(0, Math.ceil((link.next - performance.now()) / 1000));
+    const words = broken ? `The recording cannot be read: ${link.why}`
+      : killed ? `The recording ends at ${clock(run.clock)}: its process was killed, and what ran then may still run.`
+        : now === "lost" ? `${last}; ${next ? `next try in ${next} s` : "trying"}. What is missed is filled in.`
+          : link.tick > 2 ? `${last}: the tick of the tree lasts for ${Math.floor(link.tick + ago)} s.` : `${last}: nothing has come since, not even a heartbeat.`;
+    text(box.firstChild, words);
+    box.title = words;
+  }
+  return { update };
+}

@@ -1,0 +1,182 @@
+// The page: one clock, one selection, one time that all panes show. Panes read `app` and never write to each other.
+// Everything is painted in one frame, when something has changed, and not otherwise.
+//
+// Address: #run=ID &t= &node= &tab= &pane= &view=
+
+import { Run } from "./store.js";
+import { Link } from "./link.js";
+import { create_head } from "./head.js";
+import { create_strip } from "./strip.js";
+import { create_tree } from "./tree.js";
+import { create_graph } from "./graph.js";
+import { create_timeline } from "./timeline.js";
+import { create_transport } from "./transport.js";
+import { create_details } from "./details.js";
+import { create_values } from "./values.js";
+import { create_log } from "./log.js";
+import { show_none } from "./other.js";
+import { toast, dress, splitters } from "./dress.js";
+import { listen } from "./keys.js";
+
+const wide = matchMedia("(min-width: 1680px)"), narrow = matchMedia("(max-width: 700px)");
+const find = (id) => document.getElementById(id);
+const PAINT = 32;    // milliseconds between two paintings, at least
+
+const app = {
+  run: new Run(), link: null, s: null, t: 0, head: 0, at_head: true, playing: false, speed: 1, settled: false, grown: 0,
+  sel: 0, pane: "tree", tab: "details", view: "outline", follow: true, squeeze: true, zoomed: null, folded: new Set(), narrow,
+  touch() { dirty = true; },
+  hidden(id) { return wide.matches ? false : narrow.matches ? app.pane !== id : app.tab !== id; },
+  say(words) { find("said").textContent = words; toast(words); },
+  select(n, { reveal = false, attempt } = {}) {
+    if (!app.run.nodes[n] || app.run.nodes[n].gone) return;
+    app.sel = n;
+    panes.details.pick(n, attempt);
+    if (reveal) { app.let_go(); if (app.view === "outline") panes.tree.show(n); else { app.open_above(n); panes.graph.show(n); } if (app.pane === "tree" && narrow.matches && document.activeElement?.closest("#why, #log, #values")) app.go_pane("tree"); }
+    remember();
+    dirty = true;
+  },
+  seek(t, { snap = false } = {}) {
+    if (snap || t >= app.head - 1e-4) return app.go_live();
+    app.t = Math.max(0, t);
+    app.at_head = false;
+    remember();
+    dirty = true;
+  },
+  go_live() { app.t = app.head; app.at_head = true; app.playing = false; panes.tree.rewind(); remember(); dirty = true; },
+  let_go() { if (app.follow) app.set_follow(false); },
+  set_follow(on) { app.follow = on; find("follow").setAttribute("aria-pressed", on); },
+  refolded() { panes.tree.layout(); if (app.view === "graph") panes.graph.layout(); dirty = true; },
+  open_above(n) { let changed = false; for (let up = app.run.nodes[n].parent; up >= 0; up = app.run.nodes[up].parent) if (app.folded.delete(up)) changed = true; if (changed) app.refolded(); },
+  jump_running() { const list = app.run.leaves(app.s), at = list.indexOf(app.sel); if (list.length) app.select(list[(at + 1) % list.length], { reveal: true }); },
+  first_failure() { const { causes, stopped, passed } = app.run.failures(app.s), [one] = [...causes, ...stopped, ...passed]; if (one) app.select(one.n, { reveal: true }); },
+  fold_inactive() {
+    const { run, s } = app, kept = new Set();
+    const { causes, passed } = run.failures(s);
+    for (const n of [...s.running, ...[...causes, ...passed].map((one) => one.n)]) for (let up = n; up >= 0 && !kept.has(up); up = run.nodes[up].parent) kept.add(up);
+    app.folded = new Set(run.order.filter((node) => node.children.length && node.parent >= 0 && !kept.has(node.id)).map((node) => node.id));
+  },
+  go_view(view, tell = true) {
+    app.view = view;
+    find("outline").hidden = view !== "outline"; find("graph").hidden = view === "outline";
+    find("as-outline").setAttribute("aria-pressed", view === "outline"); find("as-graph").setAttribute("aria-pressed", view === "graph");
+    if (view === "graph") { if (tell && !app.folded.size && app.run.order.length > 100) app.fold_inactive(); app.open_above(app.sel); panes.graph.layout(); } else { panes.tree.layout(); panes.tree.show(app.sel); }
+    if (tell) remember();
+    dirty = true;
+  },
+  go_tab(tab, tell = true) {
+    app.tab = tab;
+    find("side").dataset.tab = tab;
+    for (const id of ["details", "values", "log"]) { find(`tab-${id}`).setAttribute("aria-selected", id === tab); find(`tab-${id}`).tabIndex = id === tab ? 0 : -1; }
+    if (tell) remember();
+    dirty = true;
+  },
+  go_pane(pane, tell = true) {
+    app.pane = pane;
+    document.body.dataset.pane = pane;
+    if (["details", "values", "log"].includes(pane)) app.go_tab(pane, false);
+    for (const button of document.querySelectorAll("#dock button")) button.setAttribute("aria-current", button.dataset.go === pane);
+    if (tell) remember();
+    dirty = true;
+  },
+  async fetch_runs() { try { return (await (await fetch("/runs")).json()).runs; } catch { return []; } },
+  open(id, params = new URLSearchParams()) {
+    app.link?.close();
+    Object.assign(app, { run: new Run(id), s: null, settled: false, grown: 0, t: 0, head: 0, at_head: true, playing: false, zoomed: null, folded: new Set(), wanted: params });
+    app.link = new Link(app.run, (what) => told(app.run, what));
+  },
+};
+let dirty = true, last = performance.now(), painted = 0;
+const panes = { head: create_head(app), strip: create_strip(app), tree: create_tree(app), graph: create_graph(app), timeline: create_timeline(app), details: create_details(app), values: create_values(app), log: create_log(app), transport: create_transport(app) };
+window.page = app;    // for tests, and for the curious
+
+// What the link tells: news, conn, reset, and settled when all that is recorded so far has come.
+function told(run, what) {
+  if (run !== app.run) return;
+  dirty = true;
+  if (what === "reset") return app.open(run.key, params_now());
+  if (!app.settled && run.began && (what === "settled" || run.over)) settle();
+  else if (!app.settled && run.over) none(app.link.why || "This recording holds no run");
+  else if (!app.settled && what === "lost") none("This run is not to be had");
+}
+
+function settle() {
+  const { run, wanted } = app, number = +wanted.get("node");
+  Object.assign(app, { settled: true, grown: run.grown });
+  app.link.look();
+  app.head = app.link.head;
+  const t = parseFloat(wanted.get("t"));
+  app.at_head = !(t >= 0 && t < app.head);
+  app.t = app.at_head ? app.head : t;
+  app.s = run.at(app.t);
+  app.set_follow(!run.over && app.at_head);
+  app.tab = wanted.get("tab") || app.tab;
+  app.pane = wanted.get("pane") || app.pane;
+  const { causes, stopped } = run.failures(app.s);
+  app.sel = run.of_id.get(number) ?? causes[0]?.n ?? stopped[0]?.n ?? run.leaves(app.s).at(-1) ?? 0;
+  find("other").hidden = true;
+  document.body.dataset.state = "run";
+  for (const pane of Object.values(panes)) pane.reset?.();
+  panes.timeline.build();
+  panes.tree.layout();
+  app.go_pane(app.pane, false); app.go_tab(app.tab, false); app.go_view(wanted.get("view") === "graph" ? "graph" : "outline", false);
+  requestAnimationFrame(() => { panes.tree.show(app.sel, 4); dirty = true; });
+  remember();
+}
+
+// The clock. Where nothing comes from the run, nothing ticks: a page must not make up progress.
+function frame(now) {
+  requestAnimationFrame(frame);
+  const dt = Math.min(0.25, (now - last) / 1000), { run, link } = app;
+  last = now;
+  if (!link) return;
+  link.look();
+  if (!app.settled) return;
+  if (link.head > app.head) { app.head = link.head; dirty = true; }
+  if (app.at_head) app.t = app.head;
+  if (link.conn !== "live" && link.conn !== "replay" && Math.floor(link.silence) !== app.silent) { app.silent = Math.floor(link.silence); dirty = true; }
+  if (app.playing && !app.at_head) {
+    app.t = Math.min(app.head, app.t + dt * app.speed * (app.squeeze && panes.transport.next(app.t) - app.t > 3 ? 8 : 1));
+    if (app.t >= app.head) { app.playing = false; app.at_head = true; }
+    dirty = true;
+  }
+  if (!dirty || now - painted < PAINT) return;
+  dirty = false;
+  painted = now;
+  if (app.grown !== run.grown) { app.grown = run.grown; if (run.nodes[app.sel].gone) app.sel = 0; panes.timeline.build(); app.refolded(); }
+  app.s = run.at(app.t);
+  for (const name of ["head", "strip", "tree", "graph", "timeline", "details", "values", "log", "transport"]) panes[name].update();
+}
+
+// The address keeps what is looked at; it is replaced, so that Back leaves the page.
+function params_now() {
+  const params = new URLSearchParams({ run: app.run.key, node: app.run.nodes[app.sel]?.number ?? 1, tab: app.tab });
+  if (!app.at_head) params.set("t", app.t.toFixed(3));
+  if (app.view === "graph") params.set("view", "graph");
+  if (narrow.matches) params.set("pane", app.pane);
+  return params;
+}
+let writing = 0;
+function remember() { clearTimeout(writing); writing = setTimeout(() => history.replaceState(null, "", `#${params_now()}`), 250); }
+
+async function enter() {
+  const params = new URLSearchParams(location.hash.slice(1));
+  if (params.has("run")) return app.open(params.get("run"), params);
+  const runs = await app.fetch_runs(), [newest] = runs, live = runs.find((one) => one.written && !one.status);
+  if (newest) return app.open((live || newest).run_id, params);
+  none();
+  setTimeout(enter, 1000);
+}
+function none(words) {
+  document.body.dataset.state = "empty";
+  find("other").hidden = false;
+  show_none(find("other"), words);
+}
+
+dress(app);
+splitters(app, panes);
+listen(app, panes);
+addEventListener("hashchange", enter);
+addEventListener("resize", () => { if (app.settled) panes.tree.layout(); dirty = true; });
+enter();
+requestAnimationFrame(frame);

@@ -1,0 +1,81 @@
+"""The page's server on a port of its own, over runs of its own."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from bt_actions.events import Event, RunBegan
+from bt_actions.page import server
+from bt_actions.recording.folders import FIRST, Summary, folder_for, held, home, write_summary
+from bt_actions.recording.writing import RunWriter
+
+
+class Served:
+    """A server that can be stopped, and started again on its port."""
+
+    def __init__(self) -> None:
+        self.port = 0
+        self.start()
+
+    def start(self) -> None:
+        opened = server.listen(self.port)
+        self.port = opened.getsockname()[1]
+        self._server = server.server_of()
+        self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [opened]})
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._server.should_exit = True
+        self._thread.join(20.0)
+        assert not self._thread.is_alive()
+
+
+class Going:
+    """A run that is being written."""
+
+    def __init__(self, events: list[Event], **options: int) -> None:
+        began = next(each for each in events if isinstance(each, RunBegan))
+        self.first = folder_for(began.run_id, began.tree, began.at.wall, home()) / FIRST
+        self.writer = RunWriter(self.first, began, **options)  # type: ignore[arg-type]
+        self._lock = held(self.first, alone=True)
+        self._lock.__enter__()
+        self._goes_on = True
+        write_summary(self.first, Summary(began.run_id, began.tree, began.at.wall))
+
+    def write(self, events: list[Event]) -> None:
+        for event in events:
+            self.writer.add(event)
+        self.writer.flush()
+
+    def end(self) -> None:
+        if self._goes_on:
+            self._goes_on = False
+            self.writer.close()
+            self._lock.__exit__(None, None, None)
+
+
+Begin = Callable[..., Going]
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    one = Served()
+    yield one
+    one.stop()
+
+
+@pytest.fixture
+def begin() -> Iterator[Begin]:
+    """Begin a run that goes on, with the options of its writer."""
+    begun: list[Going] = []
+
+    def one(events: list[Event], **options: int) -> Going:
+        begun.append(Going(events, **options))
+        return begun[-1]
+
+    yield one
+    for each in begun:
+        each.end()

@@ -1,0 +1,330 @@
+"""The page as a reader has it, in Chromium: a real run that failed, and runs that go on.
+
+Skipped where there is no Chromium with its chromedriver.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bt_actions.events import Event, Moment, RunBegan, TickLasts
+from tests.page.conftest import Begin, Going, Served
+from tests.page.test_feed import told_of
+from tests.support import browser as chromium
+from tests.support.every_kind import RUN_ID
+from tests.support.recordings import record
+
+pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing() or "-")
+ROOT = Path(__file__).parents[2]
+SETTLED = "window.page?.settled"
+WHY = "document.getElementById('why').innerText"
+ROWS = "[...document.querySelectorAll('.row:not([hidden])')].map((one) => one.innerText)"
+
+
+@pytest.fixture(scope="module")
+def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
+    with chromium.browser(tmp_path_factory.mktemp("browser")) as opened:
+        yield opened
+
+
+class Page:
+    """The page of a server, in the window."""
+
+    def __init__(self, window: chromium.Browser, served: Served) -> None:
+        self.window, self.served = window, served
+        self.place = f"http://127.0.0.1:{served.port}/"
+
+    def open(self, address: str = "", width: int = 1440) -> chromium.Browser:
+        self.window.open("about:blank")
+        self.window.open(self.place + address, width=width, height=900)
+        assert self.window.wait_for(SETTLED)
+        return self.window
+
+    def text(self, where: str, words: str) -> str:
+        """Wait for words in an element; return its text."""
+        element = f"document.querySelector({where!r})"
+        self.window.wait_for(f"{element}?.innerText.includes(arguments[0])", words)
+        return str(self.window.run(f"return {element}.innerText"))
+
+
+@pytest.fixture
+def page(window: chromium.Browser, served: Served) -> Iterator[Page]:
+    """The page; the browser must have had nothing to complain about, nor asked another host."""
+    window.complaints()
+    shown = Page(window, served)
+    yield shown
+    asked = window.run("return performance.getEntriesByType('resource').map((one) => one.name)")
+    assert asked
+    assert [each for each in asked if not each.startswith(shown.place)] == []
+    refused = "net::ERR_CONNECTION_REFUSED", "net::ERR_INCOMPLETE_CHUNKED_ENCODING"
+    said = [each for each in window.complaints() if not any(word in each for word in refused)]
+    assert said == []
+
+
+# A run that is over
+
+
+@pytest.fixture(scope="module")
+def night(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What examples/night has recorded, in a simulation in which its last move is aborted."""
+    state = tmp_path_factory.mktemp("night")
+    command = "run examples/night/night.yaml --sim --speed 20 --fault move_robot:12:abort"
+    done = subprocess.run(
+        [sys.executable, "-m", "bt_actions.cli", *command.split()],
+        cwd=ROOT,
+        env={**os.environ, "XDG_STATE_HOME": str(state)},
+        capture_output=True,
+        text=True,
+        timeout=100.0,
+        check=False,
+    )
+    assert done.returncode == 1, done.stderr
+    return state
+
+
+@pytest.fixture
+def over(night: Path, monkeypatch: pytest.MonkeyPatch, page: Page) -> Page:
+    monkeypatch.setenv("XDG_STATE_HOME", str(night))
+    return page
+
+
+@pytest.mark.ros
+def test_a_run_that_failed_says_why_first_with_the_line_of_the_file(over: Page) -> None:
+    window = over.open()
+    strip = " ".join(window.run(f"return {WHY}").split())
+    assert strip.startswith("Why exit code 1 Home: ABORTED aborted by /move_robot;")
+    assert "examples/night/night.yaml :90" in strip
+    for passed_on in ("Home in time", "Straight home", "Go home", "Shift"):
+        assert passed_on in strip
+    assert over.text("#status", "Failed") == "Failed"
+    assert over.text("#conn", "Replay") == "Replay"
+    assert over.text("#details h2", "Home").split() == ["Home", "Failed"]
+    assert "fault: abort" in over.text("#details", "Result")
+    assert "once: Home" in over.text(".yaml .at", "Home")
+
+
+@pytest.mark.ros
+def test_the_outline_has_the_nodes_with_state_and_try(over: Page) -> None:
+    window = over.open()
+    window.run("document.querySelector('#tree-scroll').scrollTop = 0")
+    window.wait_for(f"{ROWS}.some((row) => row.startsWith('Grasp'))")
+    rows = {row.split("\n")[0]: row.split("\n") for row in window.run(f"return {ROWS}")}
+    assert rows["Grasp"] == ["Grasp", "Gripper", "UNEXPECTED_RESULT", *rows["Grasp"][3:]]
+    assert rows["Grasp"][-2:] == ["3/3", "/gripper_control"]
+    assert rows["Open"][2] == "Succeeded"
+    assert len(rows) < 60
+
+
+@pytest.mark.ros
+def test_an_earlier_failure_says_what_was_expected_and_who_went_on(over: Page) -> None:
+    window = over.open()
+    window.run("document.querySelector('#why [aria-label=\"Next failure\"]').click()")
+    strip = " ".join(over.text("#why", "2 of 3").split())
+    assert "Each station 3 of 3 › Grasp: UNEXPECTED_RESULT" in strip
+    assert "result.stalled is false; expected result.stalled" in strip
+    assert "Hold the part went on" in strip
+
+
+@pytest.mark.ros
+def test_a_leap_to_a_failure_shows_that_moment_everywhere(over: Page) -> None:
+    window = over.open()
+    window.run("page.seek(0)")
+    over.text("#why", "Then")
+    window.keys("n")
+    assert "UNEXPECTED_RESULT" in over.text("#details", "Attempt 1 of 3")
+    t = window.run("return page.t")
+    assert 0 < t < window.run("return page.head")
+    assert over.text("#status", "Running") == "Running"
+    window.wait_for("location.hash.includes(`t=${page.t.toFixed(3)}`)")
+    address = window.run("return location.hash")
+    window = over.open(address)  # as it was, when the page is loaded again
+    assert window.run("return page.t") == pytest.approx(t, abs=0.001)
+    assert over.text("#details h2", "Grasp")
+    window.keys("l")
+    assert over.text("#status", "Failed") == "Failed"
+
+
+@pytest.mark.ros
+def test_every_pane_shows_the_run(over: Page) -> None:
+    window = over.open()
+    window.keys("v")
+    assert "Each station" in over.text("#values", "stations")
+    window.keys("o")
+    over.text("#log", "exit code 1")
+    window.run("document.querySelector('#log-scroll').scrollTop = 0")
+    assert "Station 0" in over.text("#log", "Station 0")
+    window.keys("t")
+    assert window.wait_for("document.querySelectorAll('#shapes .node.failure').length === 7")
+    servers = window.run(
+        "return [...document.querySelectorAll('.lane .label')].map((one) => one.innerText)"
+    )
+    assert servers[2:] == ["/gripper_control", "/move_robot"]
+    assert window.run("return document.querySelectorAll('.bar').length") > 10
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize("width", [390, 1024, 1920])
+def test_nothing_is_wider_than_the_window(over: Page, width: int) -> None:
+    window = over.open(width=width)
+    assert window.run("return document.documentElement.scrollWidth") <= width
+
+
+# Runs that go on
+
+
+class Beating:
+    """A run whose process lives: its heartbeat goes on until it is told not to."""
+
+    def __init__(self, run: Going, events: list[Event]) -> None:
+        self._run, self._at, self._stopped = run, events[-1].at, threading.Event()
+        self._lock = threading.Lock()
+        self._seconds = 0.0
+        self._thread = threading.Thread(target=self._beat)
+        self._thread.start()
+
+    def _beat(self) -> None:
+        while not self._stopped.wait(0.2):
+            self._seconds += 0.2
+            at = self._at
+            with self._lock:
+                seconds = at.steady + self._seconds
+                self._run.writer.beat(seconds, at.wall + self._seconds, at.ros, 0.0)
+                self._run.writer.flush()
+
+    def write(self, events: list[Event]) -> None:
+        with self._lock:
+            self._run.write(events)
+
+    def stop(self) -> None:
+        self._stopped.set()
+        self._thread.join()
+
+
+def test_what_happens_appears_and_the_page_follows(page: Page, begin: Begin) -> None:
+    events = told_of()
+    run = begin(events)
+    run.write(events[:6])
+    beating = Beating(run, events[:6])
+    try:
+        window = page.open()
+        assert page.text("#conn", "Live") == "Live"
+        assert "Move" in page.text("#why", "Now")
+        assert "Following live" in page.text("#go-live", "Following live")
+        beating.write(events[6:9])
+        beating.write(events[9:12])
+        page.text("#why", "1 failure")
+        window.run("window.row = document.querySelector('.row[aria-selected=true]'); row.focus()")
+        left = events[12:]
+        for each in left:
+            beating.write([each])
+        page.text("#status", "Stopped")
+        assert window.run("return document.activeElement === row && row.isConnected")
+        assert window.run("return page.run.events.length") == len(events)
+    finally:
+        beating.stop()
+    run.end()
+    assert page.text("#conn", "Replay") == "Replay"
+    assert "interrupted by SIGINT" in page.text("#why", "Stopped")
+
+
+def test_a_tick_that_lasts_is_told_with_its_leaf(page: Page, begin: Begin) -> None:
+    events = told_of()[:7]
+    at = events[-1].at
+    lasts = Moment(at.number + 1, at.steady + 1.5, at.wall + 1.5, at.ros)
+    events.append(TickLasts(lasts, 2, 1.2))
+    run = begin(events)
+    run.write(events)
+    beating = Beating(run, events)
+    try:
+        page.open()
+        page.text("#why", "in its tick for 2.")
+        page.text("#why", "in its tick for 3.")
+        assert page.text("#conn", "Live") == "Live"
+        assert "In its tick" in page.text("#tree-rows", "In its tick")
+    finally:
+        beating.stop()
+
+
+def test_a_run_without_a_heartbeat_is_stale_and_its_clock_stands(page: Page, begin: Begin) -> None:
+    events = told_of()[:7]
+    run = begin(events)
+    run.write(events)
+    beating = Beating(run, events)
+    page.open()
+    assert page.text("#conn", "Live") == "Live"
+    beating.stop()
+    assert "Stale for" in page.text("#conn", "Stale")
+    stood = page.window.run("return page.t")
+    page.text("#conn", "Stale for 4 s")
+    assert page.window.run("return page.t") == stood
+    assert page.text("#why", "Last seen")
+    run.end()  # and no end of the run is told: its process is gone
+    assert page.text("#conn", "Replay")
+    assert page.text("#status", "Never finished") == "Never finished"
+    assert "was killed" in page.text("#banner", "The recording ends")
+
+
+def test_a_lost_server_comes_back_without_a_gap(page: Page, begin: Begin, served: Served) -> None:
+    events = told_of(rounds=3)
+    run = begin(events)
+    run.write(events[:10])
+    beating = Beating(run, events[:10])
+    try:
+        window = page.open()
+        page.text("#conn", "Live")
+        window.run("page.seek(0.4)")
+        served.stop()
+        assert "Lost for" in page.text("#conn", "Lost")
+        assert "next try in" in page.text("#banner", "next try in")
+        beating.write(events[10:25])
+        served.start()
+        assert page.text("#conn", "Live") == "Live"
+        beating.write(events[25:])
+        assert window.wait_for("page.run.events.length === arguments[0]", len(events))
+        numbers = window.run("return page.run.events.map((each) => each.at[0])")
+        assert numbers == [each.at.number for each in events]
+        assert window.run("return page.t") == pytest.approx(0.4)  # the reader's time stays
+    finally:
+        beating.stop()
+
+
+def test_a_page_without_a_run_shows_the_first_that_begins(page: Page) -> None:
+    page.window.open("about:blank")
+    page.window.open(page.place)
+    page.text("#other", "No run yet")
+    record(told_of())
+    assert page.window.wait_for(SETTLED)
+    assert page.text("#tree-name", "all") == "all"
+
+
+def test_another_run_is_a_choice_away(page: Page) -> None:
+    record(told_of())
+    page.open()
+    page.window.run("document.getElementById('switch').click()")
+    assert RUN_ID[:8] in page.text("#runs", RUN_ID[:8])
+    page.window.run("document.querySelector('#runs .opt').click()")
+    assert page.window.wait_for(SETTLED)
+
+
+def test_names_that_hold_markup_are_text(page: Page) -> None:
+    nasty = "<img src=x onerror=window.pwned=1>"
+    events = told_of()
+    for number, each in enumerate(events):
+        if isinstance(each, RunBegan):
+            nodes = tuple(replace(node, name=nasty, kind=nasty) for node in each.nodes)
+            events[number] = replace(each, nodes=nodes, tree=nasty)
+    record(events)
+    window = page.open()
+    for key in "vot":
+        window.keys(key)
+    assert page.text("#tree-name", nasty) == nasty
+    assert window.run("return window.pwned ?? null") is None
+    assert window.run("return document.querySelectorAll('img').length") == 0
