@@ -31,6 +31,7 @@ COMMANDS = {
     "replay": "replay",
     "diff": "diff",
     "stats": "stats",
+    "view": "view",
     "sim": "sim",
     "cleanup": "cleanup",
     "check": "check",
