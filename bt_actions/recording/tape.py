@@ -99,4 +99,7 @@ def _fails(state: State, event: Event) -> bool:
     story = state.nodes.get(event.node)
     if story is None or not (story.is_leaf or event.by_itself):
         return False
+    parent = state.nodes.get(story.node.parent or 0)
+    if parent is not None and parent.node.kind == "invert":  # to which it is none
+        return False
     return bool(story.node.server) or story.status is not Status.FAILURE
