@@ -93,7 +93,8 @@ class RunWriter:
         self.failed = ""
         """Why nothing is written any more, or ""."""
         self._buffer = io.BytesIO()
-        self._written = 0
+        self._written = self._head = 0
+        """Bytes of the present file, and of the state with which it begins."""
         self._part = 0
         self._descriptor = _create(first)
         self._open()
@@ -114,7 +115,7 @@ class RunWriter:
         self._number = told.at.number
         self.state.observe(told)
         self._put(told)
-        if self._written + self._buffer.tell() >= self._size:
+        if self._written + self._buffer.tell() >= max(self._size, 2 * self._head):
             self._begin_part()
 
     def beat(self, steady: float, wall: float, ros: float, tick: float) -> None:
@@ -177,6 +178,7 @@ class RunWriter:
         at = state.now
         head = (self._run_id, at.number, *stamp(at.ros))
         self._message(STATE, at, encode(LAYOUTS[STATE], head, (state.tree, to_json(state))))
+        self._head = self._buffer.tell()
 
     def _attach(self, event: RunBegan) -> RunBegan:
         """Keep the tree's files beside the events."""

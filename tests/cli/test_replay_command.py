@@ -215,13 +215,14 @@ def test_events_that_are_missing_are_told_and_what_follows_is_shown(
     writer.close()
     assert main(["replay", str(first)]) == 0
     out = capsys.readouterr().out
-    assert len(re.findall(r"^\d+ events are missing here$", out, re.MULTILINE)) == 1
+    missing = re.findall(r"^(\d+) events are missing here$", out, re.MULTILINE)
+    assert [int(each) > 100 for each in missing] == [True, False]
     assert out.rstrip().endswith("not accounted for: Move on /move")
     assert main(["replay", "--json", str(first)]) == 0
     told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert told[-1]["event"] == "finished"
     assert len(told[-1]["dealt_with"]) == len(state_of(events).dealt_with)
-    assert sum("are missing here" in each.get("text", "") for each in told) == 1
+    assert sum("are missing here" in each.get("text", "") for each in told) == 2
 
 
 @pytest.mark.parametrize("options", [(), ("--json",)])

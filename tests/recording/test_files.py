@@ -114,6 +114,13 @@ def test_a_run_that_grows_gets_more_files_and_reads_as_one(tmp_path: Path) -> No
     assert told(read(tmp_path / "run.mcap")) == told(events)
 
 
+def test_a_state_that_is_longer_than_a_file_begins_no_file_with_each_event(tmp_path: Path) -> None:
+    events = every_kind(rounds=40)
+    written(tmp_path / "run.mcap", events, size=100, files=1000)
+    assert 2 < len(parts_of(tmp_path / "run.mcap")) < len(events) / 5
+    assert told(read(tmp_path / "run.mcap")) == told(events)
+
+
 @pytest.mark.parametrize("finished", [False, True])
 def test_what_old_files_held_is_counted_and_the_story_is_the_same(
     tmp_path: Path, finished: bool
