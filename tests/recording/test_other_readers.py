@@ -91,7 +91,6 @@ def all_fields(topic: str, data: bytes) -> list[Any]:
 
 
 def test_rosbags_reads_a_finished_run_whole_and_in_order(night: Path) -> None:
-    """A heartbeat may stand before events of the same batch that came while it was written."""
     known = ours(night)
     assert [each[:3] for each in with_rosbags(night)] == known
     assert {topic for topic, _, _ in known} == LAYOUTS.keys() - {STATE}
