@@ -82,7 +82,9 @@ def test_modules_the_page_the_lease_and_the_mark_of_a_typed_package_are_in_the_w
     package = ROOT / "bt_actions"
     sources = {str(path.relative_to(ROOT)) for path in package.rglob("*.py")}
     page = {str(path.relative_to(ROOT)) for path in package.glob("render/page*.*")}
+    page |= {str(path.relative_to(ROOT)) for path in package.glob("page/static/*")}
     assert {Path(path).suffix for path in page} == {".py", ".html", ".css", ".js"}
+    assert "bt_actions/page/static/main.js" in page
     others = {"bt_actions/py.typed", str(SHORT_LEASE.relative_to(ROOT))}
     others |= {
         f"bt_actions/packages/{name}" for name in ("build_environment.txt", "ros_wheels.cmake")
