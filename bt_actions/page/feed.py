@@ -52,7 +52,7 @@ async def told(
     """
     with Follower(first) as follower:
         feed = _Feed(follower, after)
-        beat, gone = 0.0, 0
+        beat, gone, last = 0.0, 0, None
         while not closing():
             now = time.monotonic()
             is_due = now - beat >= BEAT
@@ -66,7 +66,8 @@ async def told(
                 sent = True
                 if closing():
                     return
-            if is_due:
+            if is_due or follower.recording.last_beat != last:
+                last = follower.recording.last_beat
                 yield message("beat", feed.beat(is_written=not gone))
             # A run that is beginning has its file for a moment before its lock.
             if not sent and gone and (feed.ended or gone > 1):

@@ -143,6 +143,7 @@ def test_a_leap_to_a_failure_shows_that_moment_everywhere(over: Page) -> None:
     t = window.run("return page.t")
     assert 0 < t < window.run("return page.head")
     assert over.text("#status", "Running") == "Running"
+    assert over.text("#row-18", "To the shelf").split("\n")[2] == "Succeeded before"  # last round
     window.wait_for("location.hash.includes(`t=${page.t.toFixed(3)}`)")
     address = window.run("return location.hash")
     window = over.open(address)  # as it was, when the page is loaded again
@@ -178,6 +179,14 @@ def test_nothing_is_wider_than_the_window(over: Page, width: int) -> None:
 
 
 # Runs that go on
+
+
+SHIFTS = """
+window.shifts = 0;
+new PerformanceObserver((list) => { for (const one of list.getEntries()) shifts += one.value; })
+  .observe({ type: "layout-shift" });
+"""
+"""Sums up by how much anything has moved on the page that nobody has asked to."""
 
 
 class Beating:
@@ -218,6 +227,7 @@ def test_what_happens_appears_and_the_page_follows(page: Page, begin: Begin) -> 
         assert page.text("#conn", "Live") == "Live"
         assert "Move" in page.text("#why", "Now")
         assert "Following live" in page.text("#go-live", "Following live")
+        window.run(SHIFTS)
         beating.write(events[6:9])
         beating.write(events[9:12])
         page.text("#why", "1 failure")
@@ -228,6 +238,7 @@ def test_what_happens_appears_and_the_page_follows(page: Page, begin: Begin) -> 
         page.text("#status", "Stopped")
         assert window.run("return document.activeElement === row && row.isConnected")
         assert window.run("return page.run.events.length") == len(events)
+        assert window.run("return window.shifts") < 0.001
     finally:
         beating.stop()
     run.end()
@@ -294,6 +305,23 @@ def test_a_lost_server_comes_back_without_a_gap(page: Page, begin: Begin, served
         assert window.run("return page.t") == pytest.approx(0.4)  # the reader's time stays
     finally:
         beating.stop()
+
+
+def test_what_is_not_recorded_is_said(page: Page, begin: Begin) -> None:
+    events = told_of(rounds=60)
+    run = begin(events, size=20_000, files=3)
+    for each in events:
+        run.write([each])
+    run.end()
+    window = page.open()
+    assert page.text("#status", "Stopped") == "Stopped"
+    (gap,) = window.run("return page.run.missing")
+    window.run("page.seek(arguments[0])", (gap["from"] + gap["to"]) / 2)
+    assert page.text("#status", "Not recorded") == "Not recorded"
+    assert page.text("#why", "Nothing is recorded from")
+    window.run("page.seek(arguments[0])", gap["from"] - 0.5)
+    assert page.text("#status", "Running") == "Running"
+    assert window.run("return document.querySelectorAll('#lanes .missing').length") == 1
 
 
 def test_a_page_without_a_run_shows_the_first_that_begins(page: Page) -> None:

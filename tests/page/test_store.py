@@ -177,6 +177,19 @@ def test_the_state_is_the_same_where_events_are_missing(
         assert [each[:3] for each in one["dealt"]][-len(dealt) :] == [each[:3] for each in dealt]
 
 
+def test_a_batch_that_does_not_follow_is_refused_and_one_that_overlaps_is_taken_once(
+    served: Served, window: chromium.Browser
+) -> None:
+    events = [to_plain(each) for each in every_kind()]
+    in_page(served, window, events, [0])
+    batch = (
+        "const run = new window.Store.Run('x'), events = JSON.parse(arguments[0]);"
+        "const take = (from, to) => run.take({ from, to, events: events.slice(from - 1, to) });"
+        "return [take(1, 8), take(10, 12), take(5, 9), take(10, 12), run.events.length];"
+    )
+    assert window.run(batch, json.dumps(events)) == [True, False, True, True, 12]
+
+
 def in_page(
     served: Served, window: chromium.Browser, events: list[dict[str, Any]], counts: list[int]
 ) -> list[Any]:

@@ -48,6 +48,13 @@ export function view(run, n, s) {
   return seen;
 }
 
+// Whether how a node stands is from before what holds it has begun anew: of an earlier round of a loop.
+export function is_old(run, n, s) {
+  if (s.status[n] === "running" || s.status[n] === "idle") return false;
+  for (let up = run.nodes[n].parent; up >= 0; up = run.nodes[up].parent) if (s.told[n] < s.ended[up]) return true;
+  return false;
+}
+
 // The nearest loop round or subtree above, to tell nodes of one name apart.
 export function branch_of(run, n, s) {
   for (let up = run.nodes[run.nodes[n].parent]; up; up = run.nodes[up.parent]) {

@@ -3,6 +3,7 @@
 
 import { svg, status_glyph, FILL } from "./glyphs.js";
 import { STATE, kind_word } from "./words.js";
+import { is_old } from "./doing.js";
 
 const NAME = 13, UNDER = 10.5, LEVELS = 46, BETWEEN = 12, MARGIN = 28;
 const FILLS = { action: "#bfd7ff", fallback: "#8ee3ea", sequence: "#ffc46b", parallel: "#ffe070", decorator: "#f4f4fc", leaf: "#d4d8dd" };
@@ -102,7 +103,7 @@ export function create_graph(app) {
     if (app.view !== "graph") return;
     const { s, run } = app;
     for (const [n, part] of parts) {
-      const view = run.view(n, s), status = s.status[n], [word, look] = STATE[view.st], key = `${status}${look}${app.sel === n}`;
+      const view = run.view(n, s), status = is_old(run, n, s) ? "idle" : s.status[n], [word, look] = STATE[view.st], key = `${status}${look}${app.sel === n}`;
       if (part.was === key) continue;
       part.was = key;
       part.group.setAttribute("class", `node ${status}${app.sel === n ? " picked" : ""}`);

@@ -9,6 +9,8 @@ export class State {
   constructor(size = 0) {
     Object.assign(this, {
       i: 0, t: 0, number: 0, status: new Array(size).fill("idle"), message: new Array(size).fill(""), from: new Float64Array(size), to: new Float64Array(size),
+      told: new Float64Array(size),     // the number of the latest event of a node
+      ended: new Float64Array(size),    // and of that with which its visit before the latest ended
       running: new Set(), dealt: [], dealt_in_all: 0,
       lasting: null, stop: null, stopped: [], finished: null, over: null, paused: false, lost: 0,
     });
@@ -17,7 +19,7 @@ export class State {
 
   copy() {
     const made = Object.assign(Object.create(State.prototype), this);
-    for (const name of ["status", "message", "from", "to"]) made[name] = this[name].slice();
+    for (const name of ["status", "message", "from", "to", "told", "ended"]) made[name] = this[name].slice();
     for (const name of MAPS) made[name] = new Map(this[name]);
     made.running = new Set(this.running);
     made.leaves_at = -1;
@@ -27,7 +29,7 @@ export class State {
   // Nodes may come while the run goes on.
   room(size) {
     for (let n = this.status.length; n < size; n++) { this.status.push("idle"); this.message.push(""); }
-    for (const name of ["from", "to"]) {
+    for (const name of ["from", "to", "told", "ended"]) {
       if (this[name].length >= size) continue;
       const larger = new Float64Array(size);
       larger.set(this[name]);
@@ -47,6 +49,7 @@ const FOLD = {
     if (n === undefined) return;
     const before = s.status[n], node = nodes[n];
     if (before !== "running") {      // another visit
+      s.ended[n] = s.told[n];
       deal_with(s, s.pending.get(n), node.parent, nodes);
       s.pending.delete(n);
       s.from[n] = e.t;
@@ -54,6 +57,7 @@ const FOLD = {
     s.status[n] = LOOK[e.status];
     s.message[n] = e.message;
     s.to[n] = e.t;
+    s.told[n] = e.at[0];
     if (e.due_in === null || e.status !== "RUNNING") s.due.delete(n); else s.due.set(n, { from: e.t, until: e.t + e.due_in });
     if (e.status === "RUNNING") s.running.add(n); else { s.running.delete(n); s.backoff.delete(n); }
     if (e.status === "FAILURE") failed(s, n, e, nodes);

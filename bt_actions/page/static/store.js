@@ -138,6 +138,7 @@ export class Run {
     const all = (this.of_node.get(n) || []).filter((a) => a.start <= t), visit = like && like.start <= t ? like.visit : all.at(-1)?.visit;
     return all.filter((a) => a.visit === visit);
   }
+  gap_at(t) { return this.missing.find((gap) => gap.from < t && t < gap.to); }
   view(n, s) { return view(this, n, s); }
 
   leaves(s) {

@@ -13,6 +13,8 @@ export function create_strip(app) {
   const pick = (at) => { picked = at; built = ""; app.touch(); };
 
   function update() {
+    const gap = app.run.gap_at(app.t);
+    if (gap) return said("Then", "", `Nothing is recorded from ${clock(gap.from)} to ${clock(gap.to)}; what is shown is how it stood before`);
     const { run, s } = app, { causes, stopped, passed } = run.failures(s), over = s.finished && !causes.length ? s.finished.status : "";
     const known = causes.length ? [...causes, ...[...passed].reverse()] : stopped.length ? stopped : passed;
     if (known.length && (picked !== null || causes.length || stopped.length)) return chain(known, causes, stopped);

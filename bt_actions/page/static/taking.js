@@ -44,6 +44,8 @@ export const TAKE = {
   AttemptEnded(e) {
     const a = this.attempts[this.of_goal.get(e.goal_id)];
     if (!a) return;
+    const again = e.again_in === null ? "" : `; tried again in ${e.again_in.toFixed(1)} s`;
+    if (again || e.outcome !== a.oc) say(this, e, "goal", `${e.outcome}${e.reason ? `: ${e.reason}` : ""}${again}  #${e.attempt} ${a.g}`);
     Object.assign(a, { verdict: e, oc: e.outcome, decided: a.decided || e.t });
     if (e.reason) a.why = e.reason;
     if (e.again_in !== null) a.backoff = e.t + e.again_in;

@@ -155,10 +155,10 @@ export function create_timeline(app) {
 
   function marks() {
     const { run } = app, span = range[1] - range[0], step = NICE.find((one) => one / span * width > 74) || 3600;
-    const now = `${range.map((one) => one.toFixed(2))}${width}${left}${step}${scale.gaps.length}${scale.gaps.at(-1)?.to.toFixed(1)}${run.attempts.length}${run.attempts.filter((a) => a.decided).length}${tall}`;
+    const now = `${range.map((one) => one.toFixed(2))}${width}${left}${step}${scale.gaps.length}${scale.gaps.at(-1)?.to.toFixed(1)}${run.missing.length}|${run.attempts.length}${run.attempts.filter((a) => a.decided).length}${tall}`;
     if (flag_key === now) return;
     flag_key = now;
-    for (const old of lanes.querySelectorAll(".tick, .flag, .squeeze, .leap")) old.remove();
+    for (const old of lanes.querySelectorAll(".tick, .flag, .squeeze, .leap, .missing")) old.remove();
     const end = scale.back(range[1]);
     let before = -99;
     for (let t = Math.ceil(scale.back(range[0]) / step) * step; t <= end; t += step) {
@@ -174,6 +174,7 @@ export function create_timeline(app) {
       lanes.append(el("div", { class: "squeeze", style: `left:${px(x - wide / 2)};width:${wide}px;height:${tall - 24}px` }));
       ruler.append(el("span", { class: "leap", style: `left:${px(x)}`, text: `${secs(gap.to - gap.from)}`, title: "Squeezed: no goal was under way" }));
     }
+    for (const gap of run.missing) lanes.append(el("div", { class: "missing", style: `left:${px(Math.max(left, x_of(gap.from)))};width:${px(Math.max(2, x_of(gap.to) - x_of(gap.from)))};height:${tall - 24}px`, title: "Not recorded" }));
     for (const a of run.attempts) {
       if (!a.decided || a.oc === "SUCCEEDED" || a.oc === "CANCELED") continue;
       const x = x_of(a.decided);

@@ -3,6 +3,7 @@
 
 import { el, svg, status_glyph, kind_glyph } from "./glyphs.js";
 import { secs, plain, STATE, kind_word } from "./words.js";
+import { is_old } from "./doing.js";
 
 const find = (id) => document.getElementById(id);
 const SPARE = 6;
@@ -53,12 +54,13 @@ export function create_tree(app) {
   }
 
   function paint(one) {
-    const { node, was, row } = one, { s, run } = app, view = run.view(node.id, s), live = s.status[node.id] === "running";
+    const { node, was, row } = one, { s, run } = app, view = run.view(node.id, s), live = s.status[node.id] === "running", old = is_old(run, node.id, s);
     const [word, look] = STATE[view.st];
     let said = word;
     if (view.st === "failure" && view.attempt?.decided <= app.t) said = view.attempt.oc;
+    if (old) said += " before";
     if (was.st !== view.st || was.said !== said) {
-      row.dataset.st = s.status[node.id];
+      row.dataset.st = old ? "idle" : s.status[node.id];
       row.classList.toggle("live", live);
       row.classList.toggle("leafy", live && !node.children.length);
       one.state.firstChild.replaceWith(status_glyph(look));
