@@ -80,7 +80,8 @@ class Failure:
 
     node: Node
     at: Moment
-    path: tuple[str, ...]
+    holders: tuple[Node, ...]
+    """The nodes above it, upwards, as they stood then: each may be taken out later."""
     message: str
     items: tuple[tuple[Node, RoundBegan], ...] = ()
     """The rounds of the loops that it failed in, the outermost first."""
@@ -92,6 +93,11 @@ class Failure:
     """What the node has stopped, where its time was over, or its guard did not hold."""
     by: Node | None = None
     """The node that went on in spite of it; None while it is passed on upwards."""
+
+    @property
+    def path(self) -> tuple[str, ...]:
+        """The names from the root down to the node."""
+        return (*(above.name for above in reversed(self.holders)), self.node.name)
 
     @property
     def place(self) -> str:
@@ -258,17 +264,13 @@ class State:
 
     def _failure(self, story: NodeStory, message: str) -> Failure:
         number = story.node.id
-        action = self._actions.get(number)
+        action, above = self._actions.get(number), list(self.above(number))
         return Failure(
             story.node,
             self.now or Moment(0, 0.0, 0.0, 0.0),
-            self.path(number),
+            tuple(each.node for each in above),
             message,
-            tuple(
-                (above.node, above.round)
-                for above in reversed(list(self.above(number)))
-                if above.round is not None
-            ),
+            tuple((each.node, each.round) for each in reversed(above) if each.round is not None),
             action,
             tuple(action.tried) if action is not None else (),
             tuple(self._failure(each, each.message) for each in self._stopped_below(story)),

@@ -115,8 +115,8 @@ def _told(failure: Failure, state: State) -> Iterator[str]:
             said = attempt_text(each.action, each.attempts[-1])
         yield clean(f"  it stopped {state.called(each.node.id)}{f': {said}' if said else ''}")
     failed = state.status is Status.FAILURE
-    holders = state.above(failure.node.id) if failed else ()
-    passed = ", ".join(f"{above.node.name} ({above.node.kind})" for above in holders)
+    holders = failure.holders if failed else ()
+    passed = ", ".join(f"{above.name} ({above.kind})" for above in holders)
     place = failure.place or f"{failure.node.name} ({failure.node.kind})"
     yield clean(f"  {place}{f'; passed on by {passed}' if passed else ''}")
 

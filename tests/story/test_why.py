@@ -218,6 +218,26 @@ def test_a_failure_of_a_node_that_was_taken_out_since_is_told_by_its_name() -> N
     assert lines(state)[-1].endswith("  Check, failed: no; Hold (fallback) went on")
 
 
+def test_a_cause_that_was_taken_out_since_is_told_with_what_passed_it_on() -> None:
+    check = FakeNode("Check", kind="check", place="x.yaml:3:5")
+    inner = FakeNode("Inner", [check, FakeNode("Other", kind="check")])
+    last = FakeNode("Last", kind="check")
+    story = Story(FakeNode("Deliver", [inner, last], "fallback"))
+    state = story.told(
+        story.node(check, Status.FAILURE, "no"),
+        story.node(inner, Status.FAILURE),
+        story.remove(check),
+        story.node(last, Status.FAILURE),
+        story.node(story.root, Status.FAILURE),
+        story.finish(Status.FAILURE),
+    )
+    assert lines(state)[:3] == [
+        "Deliver / Inner / Check",
+        "  failed: no",
+        "  x.yaml:3:5; passed on by Inner (sequence), Deliver (fallback)",
+    ]
+
+
 def test_of_two_leaves_of_one_name_that_were_stopped_the_path_tells_which() -> None:
     leaves = [FakeNode("Wait", kind="wait") for _ in "ab"]
     sides = [FakeNode(name, [leaf]) for name, leaf in zip(("Left", "Right"), leaves, strict=True)]
