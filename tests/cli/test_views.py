@@ -540,6 +540,19 @@ def test_the_live_part_leaves_lines_for_what_scrolls_by(
     view.close()
 
 
+def test_a_node_that_was_taken_out_is_drawn_and_counted_no_more(
+    root: FakeNode, leaves: list[FakeNode], story: Story
+) -> None:
+    screen, state = Screen(30), State()
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began, *story.succeed(leaves[3]), story.remove(leaves[3]))
+    view.frame(story.time)
+    drawn = [line.strip() for line in screen.lines()]
+    assert not any(line.endswith("Step 3") for line in drawn)
+    assert any(" 0 of 10 leaves" in line for line in drawn), drawn
+    view.close()
+
+
 def test_it_shows_what_an_action_does_its_attempt_its_feedback_and_the_time_left() -> None:
     screen = Screen(60, width=120)
     leaf, feedback = moving("Step 2", attempts=3)

@@ -16,7 +16,7 @@ from bt_actions.cli.streams.stderr import CaughtStderr
 from bt_actions.cli.views.choosing import choose
 from bt_actions.cli.views.view import View
 from bt_actions.events import Event, NodeChanged, RoundBegan, RunBegan, StopWanted, TickLasts
-from bt_actions.events.kinds import NodesAdded
+from bt_actions.events.kinds import NodesAdded, NodesRemoved
 from bt_actions.story.doing import doing
 from bt_actions.story.state import OVER, NodeStory, State
 from bt_actions.story.words import goal_text, last_words, stopping_text
@@ -84,7 +84,7 @@ class LiveView(View):
     def event(self, event: Event) -> None:
         """Take in one event; let finished work scroll by."""
         match event:
-            case RunBegan() | NodesAdded():
+            case RunBegan() | NodesAdded() | NodesRemoved():
                 self._index()
             case NodeChanged():
                 self._node_changed(event)
@@ -144,6 +144,7 @@ class LiveView(View):
         self._nodes = self._state.in_order()
         self._position = {node: number for number, node in enumerate(self._nodes)}
         self._leaves = sum(self._state.nodes[node].is_leaf for node in self._nodes)
+        self._done &= self._position.keys()
 
     def _let_by(self) -> None:
         """Let what has come together scroll by, in one go: each print draws the rest anew."""
