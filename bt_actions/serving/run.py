@@ -15,7 +15,7 @@ from py_trees.common import Status
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.document import Tree, tree_outputs
 from bt_actions.events import RunEnded, StopWanted
-from bt_actions.events.stream import Reader
+from bt_actions.events.stream import Reader, Stream
 from bt_actions.messages.conversion import to_plain
 from bt_actions.ros.naming import server_name
 from bt_actions.running.runner import TreeRunner
@@ -54,6 +54,7 @@ class Run:
         self._begins, self._ended = begins, ended
         self._lock = threading.Lock()
         self._runner: TreeRunner | None = None
+        self._stream: Stream | None = None
         self.paused = False
         """No new goal is begun."""
         self.ending: Ending | None = None
@@ -108,6 +109,8 @@ class Run:
             outcome = self._to_end()
         except BaseException as error:  # noqa: BLE001 - whoever asked for it must be answered
             outcome = outcome_of(State(), succeeded=False, error=error)
+        if self._stream is not None:
+            self._stream.add(RunEnded, outcome.code, "", outcome.why, outcome.unaccounted)
         self._ended(outcome)
 
     def _to_end(self) -> RunOutcome:
@@ -116,6 +119,7 @@ class Run:
         self._begins({server_name(self._node, each.action_name) for each in leaves})
         status, error = Status.INVALID, None
         runner = TreeRunner(root, node=self._node, asked_by=self._asked_by)
+        self._stream = runner.stream
         self._watch(runner)
         try:
             with self._lock:
@@ -140,7 +144,7 @@ class Run:
             except Exception as raised:  # noqa: BLE001 - a python: node may write anything
                 status, error = Status.INVALID, raised
         with self.told() as state:
-            outcome = outcome_of(
+            return outcome_of(
                 state,
                 succeeded=status is Status.SUCCESS,
                 ending=None if status is Status.FAILURE else self.ending,
@@ -148,5 +152,3 @@ class Run:
                 outputs=outputs,
                 unaccounted=[f"{each.name} on {each.server}" for each in runner.unaccounted],
             )
-        runner.stream.add(RunEnded, outcome.code, "", outcome.why, outcome.unaccounted)
-        return outcome
