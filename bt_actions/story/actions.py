@@ -83,6 +83,11 @@ class ActionStory:
     latest: GoalStory | None = None
 
     @property
+    def lately(self) -> float:
+        """Seconds from the first wish to the last outcome of the latest visit."""
+        return self.duration - self.counted
+
+    @property
     def attempt(self) -> int:
         """The number of the latest attempt within its visit."""
         return self.latest.latest.attempt if self.latest is not None else 0

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import NodeStory, State
-from bt_actions.story.values import feedback_text
+from bt_actions.story.values import feedback_text, unmet_text
 
 _STATES = {
     "QUEUED": ("waiting for its turn", "on", "queue"),
@@ -64,8 +64,9 @@ def doing(state: State, story: NodeStory, now: float | None = None) -> Doing:
         return Doing(since=since and f"running {since}", until=until, told=told)
     if goal.verdict is not None and (pause := goal.verdict.again_in) is not None:
         left_of = "" if now is None else f" in {_seconds(goal.verdict.at.steady + pause - now)}"
-        tries, why = _tries(action.attempt + 1, action.of), f"{action.outcome}: {action.reason}"
-        return Doing(f"trying again{left_of}", tries=tries, until=until, told=why)
+        tries = _tries(action.attempt + 1, action.of)
+        told = f"{action.outcome}: {unmet_text(goal) or action.reason}"
+        return Doing(f"trying again{left_of}", tries=tries, until=until, told=told)
     does = goal_doing(action.state, action.server, action.attempt, action.of)
     since = _for(goal.since.steady, now)
     return does._replace(since=since, until=until, told=feedback_text(action))

@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from functools import partial
 
 from bt_actions.events.snapshot import Cut, Value
-from bt_actions.story.actions import ActionStory
-from bt_actions.utilities.shorten import scalars
+from bt_actions.story.actions import ActionStory, GoalStory
+from bt_actions.utilities.shorten import fit, scalars, shorten
+
+LONG = 80
+"""Characters of one value."""
 
 Constants = Mapping[str, Value]
 """By field the names of numbers."""
@@ -17,6 +20,16 @@ def feedback_text(action: ActionStory) -> str:
     """Return the latest feedback of an action on one line: its plain fields."""
     came = action.latest.feedback if action.latest is not None else None
     return "" if came is None else fields_text(came.feedback, constants_of(action, "feedback"))
+
+
+def unmet_text(goal: GoalStory) -> str:
+    """Say what an `expect` saw that its attempt's result does not meet; "" of all else."""
+    verdict = goal.verdict
+    if verdict is None or not verdict.expect:
+        return ""
+    seen = ", ".join(f"{name} is {shorten(value, LONG)}" for name, value in verdict.seen.items())
+    wanted = f"expected {fit(verdict.expect, 100)}"
+    return f"{seen}; {wanted}" if seen else wanted
 
 
 def constants_of(action: ActionStory, message: str) -> Constants:

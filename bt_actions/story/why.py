@@ -17,14 +17,12 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory, GoalStory
 from bt_actions.story.doing import doing
 from bt_actions.story.state import Failure, State
-from bt_actions.story.values import opened
+from bt_actions.story.values import LONG, opened, unmet_text
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import brief, fit, shorten
 
 LINES = 12
 """Of one story in a terminal."""
-LONG = 80
-"""Characters of one value."""
 ATTEMPTS = 3
 """Attempts of one failure that have a line of their own: the last ones."""
 BELOW = 5
@@ -146,16 +144,9 @@ def _attempts(failure: Failure) -> Iterator[str]:
 
 def attempt_text(action: ActionStory, goal: GoalStory) -> str:
     """Say of one attempt what was sent, what came back, and what was made of it."""
-    verdict = goal.verdict
-    if verdict is not None and verdict.expect:
-        seen = ", ".join(
-            f"{name} is {shorten(value, LONG)}" for name, value in verdict.seen.items()
-        )
-        wanted = f"expected {fit(verdict.expect, 100)}"
-        why_not = f"{seen}; {wanted}" if seen else wanted
-    else:  # of an end that nobody will tell any more the run tells at its end
-        is_left = goal.latest.state == DONE and goal.latest.end is End.UNKNOWN
-        why_not = "" if is_left else goal.reason
+    # of an end that nobody will tell any more the run tells at its end
+    is_left = goal.latest.state == DONE and goal.latest.end is End.UNKNOWN
+    why_not = unmet_text(goal) or ("" if is_left else goal.reason)
     told = goal.latest.state  # of a run that was left
     if goal.outcome is not None:
         told = outcome_text(goal.outcome, goal.latest.end, goal.in_doubt)

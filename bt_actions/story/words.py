@@ -16,7 +16,7 @@ from bt_actions.story.actions import ActionStory
 from bt_actions.story.doing import goal_doing
 from bt_actions.story.state import State
 from bt_actions.story.table import table
-from bt_actions.story.values import constants_of, named
+from bt_actions.story.values import constants_of, named, unmet_text
 from bt_actions.story.why import outcome_text, why
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import MESSAGE, brief, fit, shorten
@@ -115,7 +115,9 @@ def goal_text(action: ActionStory) -> str:
     text = outcome_text(action.outcome, action.end, action.in_doubt)
     if action.end is End.UNKNOWN:  # why, is told of the goal
         return f"{text}{' yet' if action.live else ''}{attempt}"
-    said = action.reason if action.outcome is not Outcome.SUCCEEDED else ""
+    if action.outcome is Outcome.SUCCEEDED or action.latest is None:
+        return f"{text}{attempt}"
+    said = unmet_text(action.latest) or action.reason
     return f"{text}{attempt}{said and f': {said}'}"
 
 

@@ -26,7 +26,7 @@ from bt_actions.cli.views.lines import LASTING, LineView
 from bt_actions.cli.views.live import SCROLLS, LiveView, suits
 from bt_actions.cli.views.view import View
 from bt_actions.document import load_tree
-from bt_actions.events import Event, RunEnded, StopWanted
+from bt_actions.events import AttemptEnded, Event, RunEnded, StopWanted
 from bt_actions.events.snapshot import snapshot
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.state import State
@@ -662,6 +662,40 @@ def test_finished_work_scrolls_by_once_and_the_drawing_is_gone_at_the_end(
         assert lines.count(f"✓ {leaf.name}  move_robot  SUCCEEDED  1.00 s") == 1
     assert not any("more node" in line or "Ctrl-C" in line for line in lines)
     assert lines[-1].startswith("SUCCESS after")
+
+
+def test_each_visit_of_an_action_scrolls_by_with_the_seconds_of_that_visit(
+    root: FakeNode, leaves: list[FakeNode], story: Story
+) -> None:
+    screen, state = Screen(24), State()
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began)
+    for visit in (1, 2, 3):
+        feed(state, view, *story.succeed(leaves[0], visit))
+    view.close()
+    assert screen.lines() == ["✓ Step 0  move_robot  SUCCEEDED  1.00 s"] * 3
+
+
+def test_an_expect_that_does_not_hold_is_told_in_the_same_words_everywhere() -> None:
+    network = VirtualNetwork()
+    ScriptedServer(network, Move, "move_robot")
+    given = {"expect": "result.final_pose > 9.0", "retry": Retry(2, backoff=0.5, jitter=0.0)}
+    runner, state = VirtualRunner(MoveRobot("Move", 1.0, **given), network), State()
+    screen = Screen(24, width=200)
+    view = LiveView(state, screen.console)
+    runner.start()
+    while not any(isinstance(each, AttemptEnded) for each in runner.events):
+        runner.advance(0.1)
+    feed(state, view, *(told := list(runner.events)))
+    view.frame(runner.now)
+    trying = screen.lines()[-1]
+    runner.advance(9.0)
+    feed(state, view, *runner.events[len(told) :])
+    unmet = "UNEXPECTED_RESULT: result.final_pose is 0.0; expected result.final_pose > 9.0"
+    assert trying.endswith(f", attempt 2 of 2: {unmet}")
+    view.close()
+    assert unmet.replace(": ", " (attempt 2): ", 1) in screen.lines()[0]
+    assert f"attempts 1 to 2: {unmet}" in why(state)[1]
 
 
 def test_a_check_that_succeeds_again_and_again_scrolls_by_once_in_each_round(

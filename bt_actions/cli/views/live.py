@@ -157,7 +157,7 @@ class LiveView(View):
         name, said = clean(self._state.called(story.node.id)), clean(story.message)
         if story.node.server:
             action = self._state.action(story.node.id)
-            said = f"{action.server}  {clean(goal_text(action))}  {action.duration:.2f} s"
+            said = f"{action.server}  {clean(goal_text(action))}  {action.lately:.2f} s"
         glyph = self._glyph(story.status), _STYLES[story.status]
         return Text.assemble(glyph, " ", name, (f"  {said}" if said else "", "dim"))
 
