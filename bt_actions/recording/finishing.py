@@ -9,12 +9,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterator
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
 from bt_actions.recording.folders import held, parts_of
+from bt_actions.recording.layout import CHANNELS, LAYOUTS, QOS, schema_of
 from bt_actions.recording.mcap_records import (
     MAGIC,
     Attachment,
@@ -26,8 +27,6 @@ from bt_actions.recording.mcap_records import (
     records,
 )
 
-QOS = {"offered_qos_profiles": ""}
-"""What readers of bags want of a channel."""
 AT_ONCE = 1_000_000
 """Bytes that take less than 0.3 s to finish."""
 _FOOTER = 2
@@ -50,14 +49,11 @@ def is_finished(part: Path) -> bool:
 def finish(first: Path) -> bool:
     """Finish the files of a run unless somebody writes them; return whether they are finished.
 
-    Each file is replaced as a whole. Raises OSError.
+    Each file is replaced as a whole; one that is damaged stays as it is. Raises OSError.
     """
     with held(first.parent), held(first, alone=True) as alone:
-        if alone:
-            for part in parts_of(first):
-                if not is_finished(part):
-                    _rewrite(part)
-        return alone
+        done = [is_finished(part) or _rewrite(part) for part in (parts_of(first) if alone else ())]
+    return alone and all(done)
 
 
 def finish_beside(first: Path, *, may_wait: bool) -> subprocess.Popen[bytes] | None:
@@ -79,8 +75,8 @@ def finish_beside(first: Path, *, may_wait: bool) -> subprocess.Popen[bytes] | N
     )
 
 
-def _rewrite(part: Path) -> None:
-    """Write all whole records of a file to another one, and put that in its place."""
+def _rewrite(part: Path) -> bool:
+    """Write the records of a file to another one, and put that in its place; else return False."""
     new = part.with_name(f".{part.name}.new")
     descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
     try:
@@ -92,33 +88,39 @@ def _rewrite(part: Path) -> None:
             file.flush()
             os.fsync(descriptor)
         new.replace(part)
-    except NoMcap:
+    except _NotOurs:
         new.unlink(missing_ok=True)
+        return False
     except BaseException:
         new.unlink(missing_ok=True)
         raise
+    return True
 
 
-def _copy(found: Iterable[Record], writer: Writer) -> None:
-    """Write records anew; schemas and channels get the numbers that the writer gives them."""
-    schemas, channels = dict[int, int](), dict[int, int]()
-    for each in found:
-        match each:
-            case Message() if each.channel in channels:
-                number = channels[each.channel]
-                writer.add_message(
-                    number, each.log_time, each.data, each.publish_time, each.sequence
-                )
-            case Schema() if each.number not in schemas:
-                number = writer.register_schema(each.name, each.encoding, each.data)
-                schemas[each.number] = number
-            case Channel() if each.number not in channels and each.schema in schemas:
-                schema = schemas[each.schema]
-                number = writer.register_channel(each.topic, each.encoding, schema, QOS)
-                channels[each.number] = number
-            case Attachment():
+class _NotOurs(ValueError):
+    """A file is not as our writer has left it: a reader may find more in it than is known here."""
+
+
+def _copy(found: Iterator[Record], writer: Writer) -> None:
+    """Write records anew; raise _NotOurs for any that our writer has not written."""
+    ours, channels = set[Record](), dict[int, int]()
+    for topic, number in CHANNELS.items():
+        name, data = LAYOUTS[topic].type, schema_of(topic)
+        schema = writer.register_schema(name, "ros2msg", data)
+        channels[number] = writer.register_channel(topic, "cdr", schema, QOS)
+        ours |= {Schema(number, name, "ros2msg", data), Channel(number, number, topic, "cdr")}
+    try:
+        for each in found:
+            if isinstance(each, Message) and each.channel in channels:
+                number, data = channels[each.channel], each.data
+                writer.add_message(number, each.log_time, data, each.publish_time, each.sequence)
+            elif isinstance(each, Attachment):
                 time = each.log_time
                 writer.add_attachment(time, time, each.name, each.media_type, each.data)
+            elif each not in ours:
+                raise _NotOurs(each)
+    except NoMcap as error:
+        raise _NotOurs from error
 
 
 if __name__ == "__main__":

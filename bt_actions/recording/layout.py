@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
+
+from bt_actions.messages.definition import ros2msg
 
 _HEADER = b"\x00\x01\x00\x00"
 """Before each message: CDR, little-endian."""
@@ -50,6 +53,16 @@ LAYOUTS = {
     LOG: Layout("rcl_interfaces/msg/Log", struct.Struct("<iIB"), 4, b"\x00\x00\x00\x00"),
 }
 """By topic."""
+CHANNELS = {topic: number for number, topic in enumerate(LAYOUTS, 1)}
+"""The number of each topic, and of its schema, in a file that is not finished yet."""
+QOS = {"offered_qos_profiles": ""}
+"""What readers of bags want of a channel."""
+
+
+@lru_cache
+def schema_of(topic: str) -> bytes:
+    """Return the message definition of a topic as other readers want it."""
+    return ros2msg(LAYOUTS[topic].type).encode()
 
 
 def encode(layout: Layout, head: Sequence[object], texts: Sequence[str] = ()) -> bytes:

@@ -1,13 +1,15 @@
 """The records of an MCAP file, as many as are whole: of one that is cut, damaged or still written.
 
 A length that is damaged hides where the next record begins: it is looked for, and the damage costs
-one record. Memory is bounded by the longest record that is read, whatever the file claims.
+one record. What is passed over is told; of a chunk or an attachment whose checksum is wrong nothing
+is read. Memory is bounded by the longest record that is read, whatever the file claims.
 """
 
 from __future__ import annotations
 
 import re
 import struct
+import zlib
 from collections.abc import Iterator
 from typing import BinaryIO, NamedTuple
 
@@ -65,7 +67,13 @@ class Attachment(NamedTuple):
     data: bytes
 
 
-Record = Message | Schema | Channel | Attachment
+class Damage(NamedTuple):
+    """Something that was passed over."""
+
+    why: str
+
+
+Record = Message | Schema | Channel | Attachment | Damage
 
 
 class NoMcap(ValueError):
@@ -73,12 +81,15 @@ class NoMcap(ValueError):
 
 
 def records(file: BinaryIO) -> Iterator[Record]:
-    """Yield what is whole of the records that tell something. Raises NoMcap, OSError."""
+    """Yield the records that tell something, and each damage. Raises NoMcap, OSError."""
     begin = file.read(len(MAGIC))
     if not MAGIC.startswith(begin):
         raise NoMcap("no MCAP file")
-    for kind, payload in _framed(file):
-        yield from _opened(kind, payload)
+    for framed in _framed(file):
+        if isinstance(framed, Damage):
+            yield framed
+        else:
+            yield from _opened(*framed)
 
 
 def message_record(
@@ -102,7 +113,7 @@ def whole_length(data: bytes) -> int:
 
 
 def _opened(kind: int, payload: bytes) -> Iterator[Record]:
-    """The record of a payload, or those of a chunk; nothing of what is damaged."""
+    """The record of a payload, or those of a chunk, up to a damage."""
     try:
         if kind == MESSAGE:
             channel, sequence, log, publish = _MESSAGE.unpack_from(payload)
@@ -123,12 +134,13 @@ def _opened(kind: int, payload: bytes) -> Iterator[Record]:
             yield Channel(number, schema, topic, _text(payload, at)[0])
         elif kind == ATTACHMENT:
             (log,) = struct.unpack_from("<Q", payload)
+            _check(payload[:-4], int.from_bytes(payload[-4:], "little"))
             name, at = _text(payload, 16)
             media, at = _text(payload, at)
             (size,) = struct.unpack_from("<Q", payload, at)
             yield Attachment(name, media, log, payload[at + 8 : at + 8 + size])
-    except (struct.error, ValueError, RuntimeError, zstandard.ZstdError):
-        return
+    except (struct.error, ValueError, RuntimeError, zstandard.ZstdError) as error:
+        yield Damage(str(error))
 
 
 def _text(payload: bytes, at: int) -> tuple[str, int]:
@@ -142,17 +154,26 @@ def _text(payload: bytes, at: int) -> tuple[str, int]:
 
 def _unpacked(payload: bytes) -> bytes:
     """The records of a chunk."""
-    _, _, size, _, length = _CHUNK.unpack_from(payload)
+    _, _, size, crc, length = _CHUNK.unpack_from(payload)
     if size > LONGEST:
         raise ValueError("a chunk is too large")
     at = _CHUNK.size + length
     packing = payload[_CHUNK.size : at]
     data = payload[at + 8 :]
     if packing == b"zstd":
-        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
-    if packing:
+        if zstandard.frame_content_size(data) not in (-1, size):  # which zstandard would believe
+            raise ValueError("a chunk is of another size")
+        data = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+    elif packing:
         raise ValueError("a chunk is packed in an unknown way")
+    _check(data, crc)
     return data
+
+
+def _check(data: bytes, crc: int) -> None:
+    """Raise ValueError for data that are not those of their checksum; 0 is none."""
+    if crc and zlib.crc32(data) != crc:
+        raise ValueError("a checksum is wrong")
 
 
 def _split(data: bytes) -> Iterator[tuple[int, bytes]]:
@@ -162,20 +183,22 @@ def _split(data: bytes) -> Iterator[tuple[int, bytes]]:
         kind, length = _HEAD.unpack_from(data, at)
         at += _HEAD.size + length
         if at > len(data):
-            return
+            raise ValueError("a record in a chunk is cut")
         yield kind, data[at - length : at]
 
 
-def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes] | Damage]:
     """The records of a file, and where one is damaged the next ones.
 
     The length of a record is believed unless another record begins before it ends.
     """
-    rest, at, is_end = b"", 0, False
+    rest, at, is_end, is_lost = b"", 0, False, False
     while True:
         while len(rest) - at < _HEAD.size and not is_end:
             rest, at, is_end = _more(file, rest, at, _WINDOW)
         if len(rest) - at < _HEAD.size:
+            if is_lost or rest[at:] not in (b"", MAGIC):
+                yield Damage("a record is cut, or its length is damaged")
             return
         kind, length = _HEAD.unpack_from(rest, at)
         end = at + _HEAD.size + length
@@ -187,12 +210,16 @@ def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
         is_whole = is_likely and len(rest) >= end
         next_one = end if is_whole and _follows(rest, end) else _found(rest, at + 1)
         if is_whole and not 0 <= next_one < end:  # else its length leads beyond the next one
+            if is_lost:
+                yield Damage("the length of a record is damaged")
             yield kind, rest[at + _HEAD.size : end]
-            at = end
-        elif next_one >= 0:
+            at, is_lost = end, False
+            continue
+        is_lost = True
+        if next_one >= 0:
             at = next_one
         elif is_end:
-            return
+            at = len(rest)
         else:  # nothing likely in sight: keep what a record may begin with
             at = max(at + 1, len(rest) - _HEAD.size)
 

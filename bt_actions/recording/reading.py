@@ -29,6 +29,7 @@ from bt_actions.events import (
 )
 from bt_actions.recording.folders import parts_of
 from bt_actions.recording.layout import (
+    CHANNELS,
     EVENTS,
     HEARTBEAT,
     LAYOUTS,
@@ -39,8 +40,16 @@ from bt_actions.recording.layout import (
     decode,
     nanoseconds,
 )
-from bt_actions.recording.mcap_records import Attachment, Channel, Message, NoMcap, Schema, records
-from bt_actions.recording.writing import CHANNELS, STATUSES
+from bt_actions.recording.mcap_records import (
+    Attachment,
+    Channel,
+    Damage,
+    Message,
+    NoMcap,
+    Schema,
+    records,
+)
+from bt_actions.recording.writing import STATUSES
 from bt_actions.story.keeping import from_json
 from bt_actions.story.state import State
 
@@ -74,7 +83,7 @@ class Recording:
         """The tree files by path, as they were recorded."""
         self.attachments: dict[str, bytes] = {}
         self.damaged = 0
-        """Messages that were passed over."""
+        """Messages that were passed over, and parts of its files that may have held several."""
         self.last_beat: float | None = None
         """When the process was last known to live, in seconds since 1970."""
         self.tick = 0.0
@@ -136,6 +145,8 @@ class Recording:
                 found = _BY_TYPE.get(self._schemas.get(record.schema, ""))
                 if found is not None:
                     self._layouts[record.number] = found
+            elif isinstance(record, Damage):
+                self.damaged += 1
             else:
                 self._attached(record)
 

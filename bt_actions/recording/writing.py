@@ -12,7 +12,6 @@ import io
 import os
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 
 from mcap.data_stream import RecordBuilder
@@ -31,18 +30,19 @@ from bt_actions.events import (
 )
 from bt_actions.events.bare import bare
 from bt_actions.events.wire import to_plain
-from bt_actions.messages.definition import ros2msg
-from bt_actions.recording.finishing import QOS
 from bt_actions.recording.layout import (
+    CHANNELS,
     EVENTS,
     GOALS,
     HEARTBEAT,
     LAYOUTS,
     LOG,
+    QOS,
     STATE,
     TRANSITIONS,
     encode,
     nanoseconds,
+    schema_of,
     stamp,
 )
 from bt_actions.recording.mcap_records import MAGIC, message_record
@@ -151,8 +151,8 @@ class RunWriter:
         self._sequences = dict.fromkeys(LAYOUTS, 0)
         for topic, layout in LAYOUTS.items():
             number = CHANNELS[topic]
-            text = _schema(layout.type)
-            self._record(Schema(id=number, name=layout.type, encoding="ros2msg", data=text))
+            data = schema_of(topic)
+            self._record(Schema(id=number, name=layout.type, encoding="ros2msg", data=data))
             self._record(Channel(number, topic, "cdr", QOS, number))
 
     def _begin_part(self) -> None:
@@ -255,18 +255,9 @@ class RunWriter:
         self._say(f"this run is not recorded any further: {self.failed} ({self.first.parent})")
 
 
-CHANNELS = {topic: number for number, topic in enumerate(LAYOUTS, 1)}
-"""The number of each topic in a file."""
-
-
 def part_of(first: Path, number: int) -> Path:
     """Return the file of a run that follows the first: ``run.1.mcap``."""
     return first.with_name(f"{first.stem}.{number}.mcap") if number else first
-
-
-@lru_cache
-def _schema(name: str) -> bytes:
-    return ros2msg(name).encode()
 
 
 def _create(path: Path) -> int:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import errno
 import os
 import random
+import struct
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import pytest
+import zstandard
 from py_trees.common import Status
 
 from bt_actions.events import (
@@ -210,14 +213,34 @@ def test_a_file_that_is_cut_at_any_byte_is_read_up_to_there(
             items = told(read(path))
             assert items == before[: len(items)]
             with path.open("rb") as file:
-                found = sum(1 for _ in mcap_records.records(file))
+                *found, last = (None, *mcap_records.records(file))
+            is_cut = isinstance(last, mcap_records.Damage)
+            assert is_cut == (end not in {len(mcap_records.MAGIC), *whole})
             heads = 1  # the header tells nothing
-            assert found == sum(each <= end for each in whole) - (heads if end >= whole[0] else 0)
+            assert len(found) - is_cut == max(0, sum(each <= end for each in whole) - heads)
     for end in range(len(mcap_records.MAGIC)):
         path.write_bytes(data[:end])
         assert read(path) == []  # as it is when a run has just begun
         with pytest.raises(RecordingError, match="holds no run"):
             Recording(path).state()
+
+
+def with_one_bit_changed(data: bytes, at: int, chance: random.Random) -> bytes:
+    return data[:at] + bytes([data[at] ^ (1 << chance.randrange(8))]) + data[at + 1 :]
+
+
+def test_finishing_takes_nothing_from_a_damaged_file(
+    tmp_path: Path, sample: tuple[bytes, list[Event]]
+) -> None:
+    data, _ = sample
+    chance, path, finished = random.Random(35), tmp_path / "run.mcap", 0
+    heads = [end + byte for end in ends_of_records(data)[:12] for byte in (0, 1, 9, 10, 11, 12)]
+    for at in [*heads, *(chance.randrange(8, len(data)) for _ in range(100))]:
+        path.write_bytes(with_one_bit_changed(data, at, chance))
+        before = told(read(path))
+        finished += finish(path)
+        assert told(read(path)) == before
+    assert 20 < finished < 150  # a bit within a text is no damage that can be seen
 
 
 def test_one_damaged_byte_costs_one_message(
@@ -230,9 +253,7 @@ def test_one_damaged_byte_costs_one_message(
     first_message = next(end for end in layouts if data[end] == mcap_records.MESSAGE)
     for _ in range(1000):
         at = chance.randrange(first_message, len(data))
-        path.write_bytes(
-            data[:at] + bytes([data[at] ^ (1 << chance.randrange(8))]) + data[at + 1 :]
-        )
+        path.write_bytes(with_one_bit_changed(data, at, chance))
         items = [(type(each), each.at.number) for each in read(path) if not isinstance(each, State)]
         missing = set(before) - set(items)
         assert len(missing) <= 1, f"byte {at}"
@@ -261,18 +282,38 @@ def test_no_damage_makes_more_than_an_error_in_words(
             continue
 
 
-def test_a_chunk_that_claims_to_be_huge_is_passed_over(tmp_path: Path) -> None:
-    import struct
+def test_in_a_finished_file_no_damage_is_taken_for_what_happened(
+    tmp_path: Path, sample: tuple[bytes, list[Event]]
+) -> None:
+    """What is lost is said, and no value is another one."""
+    data, _ = sample
+    chance, path = random.Random(38), tmp_path / "run.mcap"
+    path.write_bytes(data)
+    finish(path)
+    data, before = path.read_bytes(), told(read(path))
+    for _ in range(300):
+        path.write_bytes(with_one_bit_changed(data, chance.randrange(8, len(data)), chance))
+        recording = Recording(path)
+        items = told(list(recording.items()))
+        assert recording.damaged or items == before
 
-    import zstandard
 
+@pytest.mark.parametrize("claim", [100_000_000, 1000], ids=["a huge one", "a small one"])
+def test_a_chunk_is_passed_over_that_is_huge_whatever_size_it_claims(
+    tmp_path: Path, claim: int
+) -> None:
     packed = zstandard.compress(bytes(100_000_000))
-    chunk = (
-        struct.pack("<QQQII", 0, 0, 100_000_000, 0, 4) + b"zstd" + struct.pack("<Q", len(packed))
-    )
+    chunk = struct.pack("<QQQII", 0, 0, claim, 0, 4) + b"zstd" + struct.pack("<Q", len(packed))
     record = struct.pack("<BQ", mcap_records.CHUNK, len(chunk + packed)) + chunk + packed
     (tmp_path / "bomb.mcap").write_bytes(mcap_records.MAGIC + record)
-    assert read(tmp_path / "bomb.mcap") == []
+    recording = Recording(tmp_path / "bomb.mcap")
+    tracemalloc.start()
+    try:
+        assert list(recording.items()) == []
+        assert tracemalloc.get_traced_memory()[1] < 20_000_000
+    finally:
+        tracemalloc.stop()
+    assert recording.damaged == 1
 
 
 def test_names_that_never_end_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,10 +17,9 @@ from bt_actions.cli.commands.report import data
 from bt_actions.events import GoalChanged, to_line
 from bt_actions.recording import reading
 from bt_actions.recording.folders import summary_of
-from bt_actions.recording.layout import EVENTS, LAYOUTS, STATE, encode
+from bt_actions.recording.layout import CHANNELS, EVENTS, LAYOUTS, STATE, encode
 from bt_actions.recording.reading import RecordingError
 from bt_actions.recording.report import markdown, reports, text
-from bt_actions.recording.writing import CHANNELS
 from bt_actions.story.keeping import to_json
 from bt_actions.utilities.plain_text import as_json
 from tests.support.every_kind import every_kind
