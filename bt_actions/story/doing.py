@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import NodeStory, State
-from bt_actions.story.values import feedback_text, unmet_text
+from bt_actions.story.values import feedback_text, round_text, unmet_text
 
 _STATES = {
     "QUEUED": ("waiting for its turn", "on", "queue"),
@@ -34,7 +34,7 @@ class Doing(NamedTuple):
     since: str = ""
     """``for 1.9 s``"""
     tries: str = ""
-    """``attempt 2 of 3``"""
+    """``attempt 2 of 3``; of a loop ``item 2 of 3 (4.5)``"""
     until: str = ""
     """``6.1 s left (timeout.result)``"""
     told: str = ""
@@ -61,7 +61,8 @@ def doing(state: State, story: NodeStory, now: float | None = None) -> Doing:
     if action is None or goal is None:
         since = _for(story.since.steady, now) if story.since is not None else ""
         told = story.message if story.is_leaf else ""
-        return Doing(since=since and f"running {since}", until=until, told=told)
+        tries = round_text(story.round) if story.round is not None else ""
+        return Doing(since=since and f"running {since}", tries=tries, until=until, told=told)
     if goal.verdict is not None and (pause := goal.verdict.again_in) is not None:
         left_of = "" if now is None else f" in {_seconds(goal.verdict.at.steady + pause - now)}"
         tries = _tries(action.attempt + 1, action.of)

@@ -380,6 +380,14 @@ class State:
         story = self.nodes.get(node)
         return story.status if story is not None else Status.INVALID
 
+    def is_begun(self, node: int) -> bool:
+        """Whether a node did anything in the latest visits, and rounds, of all that holds it."""
+        number = self.nodes[node].number
+        return all(
+            number > above.ended and (above.round is None or number > above.round.at.number)
+            for above in self.above(node)
+        )
+
     def above(self, node: int) -> Iterator[NodeStory]:
         """Yield what holds a node, upwards."""
         parent = self.nodes[node].node.parent

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
+from bt_actions.events.kinds import RoundBegan
 from bt_actions.events.snapshot import Cut, Value
 from bt_actions.story.actions import ActionStory, GoalStory
 from bt_actions.utilities.shorten import fit, scalars, shorten
@@ -20,6 +21,14 @@ def feedback_text(action: ActionStory) -> str:
     """Return the latest feedback of an action on one line: its plain fields."""
     came = action.latest.feedback if action.latest is not None else None
     return "" if came is None else fields_text(came.feedback, constants_of(action, "feedback"))
+
+
+def round_text(begun: RoundBegan, of: str = "") -> str:
+    """Return ``item 2 of 3 (4.5)``, or ``round 2``; `of` says of which loop."""
+    word = "round" if begun.item is None else "item"
+    most = "" if begun.of is None else f" of {begun.of}"
+    item = "" if begun.item is None else f" ({shorten(begun.item, LONG)})"
+    return f"{word} {begun.number + 1}{most}{of}{item}"
 
 
 def unmet_text(goal: GoalStory) -> str:

@@ -12,12 +12,11 @@ from collections.abc import Iterator
 
 from py_trees.common import Status
 
-from bt_actions.events.kinds import Node, RoundBegan
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory, GoalStory
 from bt_actions.story.doing import doing
 from bt_actions.story.state import Failure, State
-from bt_actions.story.values import LONG, opened, unmet_text
+from bt_actions.story.values import LONG, opened, round_text, unmet_text
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import brief, fit, shorten
 
@@ -104,7 +103,7 @@ def waits(state: State, now: float) -> list[str]:
 
 def _told(failure: Failure, state: State) -> Iterator[str]:
     """Yield when, where and in which item it failed; each attempt; who passed it on."""
-    items = "".join(f", {_item(*each)}" for each in failure.items)
+    items = _items(failure)
     yield clean(f"{_clock(failure.at.wall)}  {' / '.join(failure.path)}{items}")
     yield from _attempts(failure)
     for each in failure.below:
@@ -182,7 +181,7 @@ def _dealt_with(state: State) -> Iterator[str]:
     are_all = len(groups) <= 2 and len(state.dealt_with) == state.dealt_with_in_all
     yield f"failed before, and dealt with{'' if are_all else ' (the last 2)'}:"
     for failure, times in list(groups.values())[-2:]:
-        items = "".join(f", {_item(*each)}" for each in failure.items)
+        items = _items(failure)
         last = failure.attempts[-1] if failure.attempts else None
         said, tries = failure.message, ""
         if failure.action is not None and last is not None:
@@ -194,11 +193,9 @@ def _dealt_with(state: State) -> Iterator[str]:
         yield clean(f"  {_clock(failure.at.wall)}  {name}{items}, failed{tries}: {brief(said)}{by}")
 
 
-def _item(loop: Node, begun: RoundBegan) -> str:
-    of = "" if begun.of is None else f" of {begun.of}"
-    if begun.item is None:
-        return f"round {begun.number + 1}{of} of {loop.name}"
-    return f"item {begun.number + 1}{of} of {loop.name} ({shorten(begun.item, LONG)})"
+def _items(failure: Failure) -> str:
+    told = (round_text(begun, f" of {loop.name}") for loop, begun in failure.items)
+    return "".join(f", {each}" for each in told)
 
 
 def _clock(wall: float) -> str:

@@ -166,9 +166,66 @@ def test_a_check_that_succeeds_again_and_again_has_one_line_in_each_round_of_a_l
     lines = Lines(story.began, story.node(check, succeeds), story.node(check, succeeds))
     assert lines.said == ["SUCCESS  Again / Check"]
     lines.feed(story.round(loop, 1), story.node(check, succeeds), story.node(check, succeeds))
-    assert lines.said == ["SUCCESS  Again / Check"] * 2
+    assert lines.said[1:] == ["round    Again: round 2", "SUCCESS  Again / Check"]
     lines.feed(story.node(check, Status.FAILURE, "no"), story.node(check, Status.FAILURE, "no"))
-    assert lines.said[2:] == ["FAILURE  Again / Check: no"]
+    assert lines.said[3:] == ["FAILURE  Again / Check: no"]
+
+
+def test_a_loop_tells_its_item_in_a_line_at_each_round_and_beside_its_name_while_it_runs() -> None:
+    step = FakeNode("Step", kind="check")
+    loop = FakeNode("Each station", [step], "for_each")
+    story, state, screen = Story(FakeNode("Shift", [loop])), State(), Screen(24)
+    begins = [story.round(loop, 0, 4.5, of=2), story.node(step, Status.SUCCESS)]
+    events = [story.began, *begins, story.node(loop, Status.RUNNING), story.round(loop, 1, 3.0, 2)]
+    assert Lines(*events).said == [
+        "round    Shift / Each station: item 1 of 2 (4.5)",
+        "SUCCESS  Shift / Each station / Step",
+        "RUNNING  Shift / Each station",
+        "round    Shift / Each station: item 2 of 2 (3.0)",
+    ]
+    view = LiveView(state, screen.console)
+    feed(state, view, *events)
+    view.frame(story.time)
+    assert "  ▶ Each station  item 2 of 2 (3.0)" in screen.lines()
+    view.close()
+
+
+def test_what_a_round_or_a_visit_has_not_begun_yet_shows_nothing_of_the_one_before() -> None:
+    pair = [FakeNode(name, kind="check") for name in ("First", "Second")]
+    both, last = FakeNode("Both", list(pair)), FakeNode("Last", kind="check")
+    loop = FakeNode("Again", [both], "repeat")
+    story = Story(FakeNode("Work", [loop, last]))
+    ends = [*pair, both, last]
+
+    def drawn(*events: Event) -> tuple[list[str], list[str]]:
+        """The tree as it is drawn, and the progress."""
+        state, screen = State(), Screen(40)
+        view = LiveView(state, screen.console)
+        feed(state, view, story.began, *events)
+        view.frame(story.time)
+        live = [line.strip() for line in screen.lines() if not line.startswith(("✓", "▶ W"))]
+        view.close()
+        return live[1:], re.findall(r"\d+ of \d+ leaves", live[0])
+
+    def done(*nodes: FakeNode) -> list[Event]:
+        return [story.node(each, Status.SUCCESS) for each in nodes]
+
+    first = [story.node(loop, Status.RUNNING), story.round(loop, 0), *done(*ends)]
+    assert drawn(*first)[1] == ["3 of 3 leaves"]
+    tree, count = drawn(*first, story.round(loop, 1))
+    assert (tree[2:], count) == (["· Both", "· First", "· Second", "✓ Last"], ["1 of 3 leaves"])
+    for anew in (story.round(loop, 1), story.node(pair[0], Status.RUNNING)):
+        again = [*first, anew, *done(pair[0]), story.node(both, Status.RUNNING)]
+        tree, count = drawn(*again)
+        assert [line.partition("  ")[0] for line in tree] == [
+            "· Work",
+            "▶ Again",
+            "▶ Both",
+            "✓ First",
+            "· Second",
+            "✓ Last",
+        ]
+        assert count == ["2 of 3 leaves"]
 
 
 def test_a_round_of_one_loop_tells_nothing_anew_of_what_is_outside_of_it() -> None:

@@ -150,8 +150,10 @@ class Story:
     def lasts(self, node: FakeNode, seconds: float, *, is_over: bool = False) -> TickLasts:
         return TickLasts(self._next(), node.id, seconds, is_over)
 
-    def round(self, loop: FakeNode, number: int, item: Value = None) -> RoundBegan:
-        return RoundBegan(self._next(), loop.id, number, None, item)
+    def round(
+        self, loop: FakeNode, number: int, item: Value = None, of: int | None = None
+    ) -> RoundBegan:
+        return RoundBegan(self._next(), loop.id, number, of, item)
 
     def finish(self, status: Status, *unaccounted: GoalReport, **more: object) -> TreeFinished:
         return TreeFinished(self._next(), status, unaccounted=unaccounted, **more)

@@ -21,6 +21,7 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory
 from bt_actions.story.doing import doing
 from bt_actions.story.state import OVER, NodeStory, State
+from bt_actions.story.values import round_text
 from bt_actions.story.why import attempt_text
 from bt_actions.story.words import goal_text, last_words, stopping_text, troubles
 from bt_actions.utilities.plain_text import clean
@@ -65,6 +66,7 @@ class LineView(View):
             case RoundBegan():
                 for node in self._state.below(event.node):
                     self._nodes.pop(node, None)
+                self._line(event.at.steady, "round", event.node, round_text(event))
             case StopWanted(abandons=False):
                 self._write(stopping_text(self._state))
 
@@ -92,7 +94,7 @@ class LineView(View):
         """Return what a node says that no line has said, of its attempt or of a child."""
         said = event.message
         if event.status is Status.RUNNING:
-            return str(doing(self._state, story, event.at.steady)._replace(since=""))
+            return str(doing(self._state, story, event.at.steady)._replace(since="", tries=""))
         if said == Outcome.SUCCEEDED or said in [
             self._state.nodes[each].message for each in story.children
         ]:

@@ -93,6 +93,7 @@ class LiveView(View):
             case RoundBegan():
                 for node in self._state.below(event.node):
                     self._last.pop(node, None)
+                    self._done.discard(node)
             case StopWanted(abandons=False):
                 self.say(stopping_text(self._state))
 
@@ -100,6 +101,9 @@ class LiveView(View):
         story, status = self._state.nodes[event.node], event.status
         (self._running.add if status is Status.RUNNING else self._running.discard)(event.node)
         if not story.is_leaf:
+            if status is not Status.INVALID:  # it may have begun anew
+                below = self._done.intersection(self._state.below(event.node))
+                self._done -= {each for each in below if not self._state.is_begun(each)}
             return
         if status in OVER:
             self._done.add(event.node)
@@ -199,7 +203,9 @@ class LiveView(View):
 
     def _node(self, now: float, node: int, depth: int, mark: str) -> Text:
         story = self._state.nodes[node]
-        status = Status.RUNNING if node in self._running else story.status
+        status = Status.RUNNING if node in self._running else Status.INVALID
+        if status is Status.INVALID and self._state.is_begun(node):
+            status = story.status
         narrow = self._width < NARROW
         text = Text((" " if narrow else "  ") * depth)
         text.append(f"{self._glyph(status)} ", style=_STYLES[status])

@@ -33,7 +33,6 @@ class PlayedView(LiveView):
         if state.lasting is not None:
             self._running.add(state.lasting.node)
         leaves = [each for each in state.nodes.values() if each.is_leaf and each.status in OVER]
-        self._done = {each.node.id for each in leaves}
         room = self._console.height - 1
         if state.ended is not None:
             words = last_words(state, self._width)
