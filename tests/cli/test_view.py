@@ -6,6 +6,7 @@ import http.client
 import signal
 import subprocess
 import sys
+import webbrowser
 from urllib.parse import urlsplit
 
 import pytest
@@ -27,6 +28,18 @@ def test_the_address_is_the_one_line_of_output_and_a_signal_ends_it(start: Start
     assert connection.getresponse().status == 200
     view.popen.send_signal(signal.SIGINT)
     assert view.popen.wait(20.0) == 130
+
+
+def test_open_shows_the_page_in_a_browser(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import uvicorn
+
+    shown: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", shown.append)
+    monkeypatch.setattr(uvicorn.Server, "run", lambda *_, **__: None)
+    assert main(["view", "--open"]) == 0
+    assert capsys.readouterr().out.split() == shown
 
 
 def test_a_run_that_is_not_there_is_told(capsys: pytest.CaptureFixture[str]) -> None:

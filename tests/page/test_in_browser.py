@@ -178,6 +178,45 @@ def test_nothing_is_wider_than_the_window(over: Page, width: int) -> None:
     assert window.run("return document.documentElement.scrollWidth") <= width
 
 
+@pytest.mark.ros
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_every_text_can_be_read_in_light_and_dark(over: Page, scheme: str) -> None:
+    over.window.scheme(scheme)
+    for pane in ("tab=details", "tab=values", "tab=log&t=2.0", "view=graph"):
+        assert over.open(f"#{pane}").run(CONTRAST) == []
+
+
+CONTRAST = """
+const pen = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+const rgba = (colour) => {
+  pen.clearRect(0, 0, 1, 1); pen.fillStyle = colour; pen.fillRect(0, 0, 1, 1);
+  return [...pen.getImageData(0, 0, 1, 1).data];
+};
+const light = ([r, g, b]) => [r, g, b].map((one) => one / 255)
+  .map((one) => (one <= 0.04045 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4))
+  .reduce((sum, one, at) => sum + one * [0.2126, 0.7152, 0.0722][at], 0);
+const over = (top, under) => top.slice(0, 3)
+  .map((one, at) => one * top[3] / 255 + under[at] * (1 - top[3] / 255));
+const ground = (element) => {
+  const layers = [];
+  for (; element; element = element.parentElement) {
+    layers.unshift(rgba(getComputedStyle(element).backgroundColor));
+  }
+  return layers.reduce((under, top) => over(top, under), [255, 255, 255]);
+};
+return [...document.body.querySelectorAll("*")]
+  .filter((one) => one.checkVisibility() && !one.closest("svg, noscript, .off-screen, :disabled"))
+  .filter((one) => [...one.childNodes].some((child) => child.data?.trim()))
+  .filter((one) => {
+    const back = ground(one), front = over(rgba(getComputedStyle(one).color), back);
+    const [dark, bright] = [light(front), light(back)].sort((a, b) => a - b);
+    return (bright + 0.05) / (dark + 0.05) < 4.5;
+  })
+  .map((one) => `${one.className}: ${one.textContent}`);
+"""
+"""The texts that are seen whose contrast with what is behind them is too little, by WCAG 2."""
+
+
 # Runs that go on
 
 
@@ -322,6 +361,19 @@ def test_what_is_not_recorded_is_said(page: Page, begin: Begin) -> None:
     window.run("page.seek(arguments[0])", gap["from"] - 0.5)
     assert page.text("#status", "Running") == "Running"
     assert window.run("return document.querySelectorAll('#lanes .missing').length") == 1
+
+
+def test_a_page_that_has_taken_much_begins_anew_where_it_is(page: Page, begin: Begin) -> None:
+    events = told_of(rounds=9)
+    run = begin(events)
+    run.write(events[:10])
+    window = page.open()
+    window.run("page.more = 50; window.old = page.run; page.go_tab('log'); page.seek(0.4)")
+    for each in events[10:]:
+        run.write([each])
+    assert window.wait_for("page.run !== old && page.settled")
+    assert window.wait_for("page.run.events.length === arguments[0]", len(events))
+    assert window.run("return [page.t, page.tab, page.at_head]") == [0.4, "log", False]
 
 
 def test_a_page_without_a_run_shows_the_first_that_begins(page: Page) -> None:

@@ -20,11 +20,12 @@ import { listen } from "./keys.js";
 
 const wide = matchMedia("(min-width: 1680px)"), narrow = matchMedia("(max-width: 700px)");
 const find = (id) => document.getElementById(id);
-const PAINT = 32;    // milliseconds between two paintings, at least
+const PAINT = 32;          // milliseconds between two paintings, at least
+const MORE = 300_000;     // events that come to a page before it begins anew with what is recorded by then, which is bounded
 
 const app = {
   run: new Run(), link: null, s: null, t: 0, head: 0, at_head: true, playing: false, speed: 1, settled: false, grown: 0,
-  sel: 0, pane: "tree", tab: "details", view: "outline", follow: true, squeeze: true, zoomed: null, folded: new Set(), narrow,
+  sel: 0, pane: "tree", tab: "details", view: "outline", follow: true, squeeze: true, zoomed: null, folded: new Set(), narrow, more: MORE, first: 0,
   touch() { dirty = true; },
   hidden(id) { return wide.matches ? false : narrow.matches ? app.pane !== id : app.tab !== id; },
   say(words) { find("said").textContent = words; toast(words); },
@@ -94,7 +95,7 @@ window.page = app;    // for tests, and for the curious
 function told(run, what) {
   if (run !== app.run) return;
   dirty = true;
-  if (what === "reset") return app.open(run.key, params_now());
+  if (what === "reset" || (app.settled && run.events.length > app.first + app.more)) return app.open(run.key, params_now());
   if (!app.settled && run.began && (what === "settled" || run.over)) settle();
   else if (!app.settled && run.over) none(app.link.why || "This recording holds no run");
   else if (!app.settled && what === "lost") none("This run is not to be had");
@@ -102,7 +103,7 @@ function told(run, what) {
 
 function settle() {
   const { run, wanted } = app, number = +wanted.get("node");
-  Object.assign(app, { settled: true, grown: run.grown });
+  Object.assign(app, { settled: true, grown: run.grown, first: run.events.length });
   app.link.look();
   app.head = app.link.head;
   const t = parseFloat(wanted.get("t"));

@@ -53,7 +53,7 @@ export function create_strip(app) {
       why.replaceChildren(el("div", { class: "label" }, el("span", { text: when }), el("small", { text: running ? `${leaves.length} running` : "" })),
         ...(!running && done ? [el("div", { class: "leaf" }, el("span"), el("b", { text: done + lost }))] : []), ...refs.map((ref) => ref.button),
         ...(rest > 0 ? [el("button", { class: "leaf", text: `and ${rest} more`, onclick: () => app.jump_running() })] : []), el("span", { class: "gap" }),
-        ...(known.length ? [el("div", { class: "step" }, el("button", { class: "danger wide", title: "Why it failed, and who dealt with it", onclick: () => pick(known.length - 1), text: known.length === 1 ? "1 failure" : `${known.length} failures` }))] : []));
+        ...(known.length ? [el("div", { class: "step" }, el("button", { class: "danger wide", title: "Why it failed, and who dealt with it", onclick: () => pick(known.length - 1), text: `${known.length === 1 ? "1 failure" : `${known.length} failures`}${running ? "" : ", dealt with"}` }))] : []));
     }
     views.slice(0, 3).forEach(([n, view], k) => {
       const ref = refs[k], told = waiting_for(run.nodes[n], view, s), { limit } = view;

@@ -74,6 +74,8 @@ export const TAKE = {
   RunEnded(e) {
     this.info.exit_code = e.exit_code;
     say(this, e, e.exit_code ? "error" : "info", `the run is over, exit code ${e.exit_code}${e.cause ? `: ${e.cause}` : ""}`);
+    if (e.world) say(this, e, "info", e.world);
+    if (e.complaint || e.error) say(this, e, "error", e.complaint || e.error);
     for (const line of e.unaccounted) say(this, e, "error", `not accounted for: ${line}`);
   },
   StateKnown(e) {
