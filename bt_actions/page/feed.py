@@ -98,9 +98,11 @@ class _Feed:
         for item in self._follower.news():
             self.ended = self.ended or isinstance(item, RunEnded)
             at = item.now if isinstance(item, State) else item.at
-            if at is None or at.number <= self.number or isinstance(item, EventsLost):
+            if at is None or at.number <= self.number:
                 continue
             events.append(known(item) if isinstance(item, State) else to_plain(item))
+            if isinstance(item, EventsLost):  # which has the number of what follows
+                continue
             last = at.number
             if len(events) >= MOST:
                 yield self._batch(events, last)

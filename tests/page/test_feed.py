@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -27,8 +28,12 @@ from tests.support.waiting import until
 
 
 def told_of(rounds: int = 1) -> list[Event]:
-    """Events of every kind that is told; what this reader has lost is no business of the next."""
-    return [each for each in every_kind(rounds) if not isinstance(each, EventsLost)]
+    """Events of every kind, in which what was lost has the number of what follows."""
+    events = every_kind(rounds)
+    for at, each in enumerate(events[:-1]):
+        if isinstance(each, EventsLost):
+            events[at] = replace(each, at=events[at + 1].at)
+    return events
 
 
 class Told:

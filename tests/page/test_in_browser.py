@@ -341,6 +341,7 @@ def test_a_lost_server_comes_back_without_a_gap(page: Page, begin: Begin, served
         assert window.wait_for("page.run.events.length === arguments[0]", len(events))
         numbers = window.run("return page.run.events.map((each) => each.at[0])")
         assert numbers == [each.at.number for each in events]
+        assert window.run("return page.run.lines.some((line) => line.x.startsWith('7 events'))")
         assert window.run("return page.t") == pytest.approx(0.4)  # the reader's time stays
     finally:
         beating.stop()

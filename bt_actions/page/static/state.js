@@ -83,8 +83,8 @@ const FOLD = {
   RunEnded(s, e) { s.over = e; },
   // Where the events that led to a state are missing from the recording, the state is all that is known.
   StateKnown(s, e, nodes) {
-    const { i, t } = s;
-    Object.assign(s, new State(nodes.length), { i, t });
+    const { i, t, lost } = s;
+    Object.assign(s, new State(nodes.length), { i, t, lost });
     for (const inner of e.events) FOLD[inner.kind]?.(s, inner, nodes);
     s.number = e.at[0];
     s.pending = new Map(e.pending.map(([n, failures]) => [n, failures]));

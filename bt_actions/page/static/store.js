@@ -34,7 +34,7 @@ export class Run {
   }
 
   push(e) {
-    this.number = e.at[0];
+    if (e.kind !== "EventsLost") this.number = e.at[0];    // which has the number of what follows
     if (!this.began) {
       const began = e.kind === "RunBegan" ? e : e.events?.find((one) => one.kind === "RunBegan");
       if (!began) return void this.early.push(e);
@@ -47,7 +47,7 @@ export class Run {
 
   add(e) {
     this.resolve(e);
-    this.clock = Math.max(this.clock, e.t);
+    if (e.kind !== "EventsLost") this.clock = Math.max(this.clock, e.t);
     if (!["FeedbackCame", "VariableWritten"].includes(e.kind) && this.steps.at(-1) !== e.t) this.steps.push(e.t);
     TAKE[e.kind]?.call(this, e);
     this.events.push(e);
