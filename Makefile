@@ -13,7 +13,7 @@ PROJECT := setup.py setup.cfg pyproject.toml package.xml $(shell find trees laun
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH
 unexport RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup dev demo quick test docs chaos soak bench bench-short lint types format colcon clean python colcon-python
+.PHONY: help setup dev demo quick test oracle docs chaos soak bench bench-short lint types format colcon clean python colcon-python
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -30,6 +30,9 @@ test: lint types ## check the code and run every test
 
 quick: lint types ## check the code, and run the tests that need no ROS; a minute
 	CI= $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal --without-ros -m "not chaos and not slow"
+
+oracle: dev ## how often trees do what BehaviorTree.CPP did with them; CASES=FILE takes other cases
+	$(BIN)/python -m tests.support.oracle $(CASES)
 
 docs: dev ## remake the pages and pictures that come from the code; `make test` fails when one is stale
 	$(BIN)/python scripts/goal_doc.py

@@ -1,0 +1,42 @@
+"""How many cases of the oracle agree, by group and kind: python -m tests.support.oracle [FILE].
+
+With `--show KIND`, also the cases of that kind that differ (`any` for all).
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+from tests.support.oracle.cases import CASES, read
+from tests.support.oracle.comparing import difference
+from tests.support.oracle.writing import NotYet
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m tests.support.oracle")
+    parser.add_argument("file", nargs="?", type=Path, default=CASES)
+    parser.add_argument("--show", metavar="KIND", default="")
+    arguments = parser.parse_args()
+    agree, differ, not_yet = Counter[str](), Counter[str](), Counter[str]()
+    with tempfile.TemporaryDirectory() as directory:
+        for case in read(arguments.file):
+            mode = "exact" if case.is_exact else "once"
+            rows = (f"in all, {mode}", f"{case.group}, {mode}", *case.kinds)
+            try:
+                found = difference(case, Path(directory) / "tree.yaml")
+            except NotYet as missing:
+                not_yet[str(missing)] += 1
+                continue
+            (differ if found else agree).update(rows)
+            if found and arguments.show in ("any", *case.kinds):
+                print(case.xml, case.acts, case.conds, found, sep="\n  ")
+    for row in sorted(agree | differ, key=lambda row: ("," not in row, row)):
+        print(f"{row:28} {agree[row]:6} agree {differ[row]:6} differ")
+    print(f"not yet, {not_yet.total()}: {', '.join(f'{w} {n}' for w, n in not_yet.most_common())}")
+
+
+if __name__ == "__main__":
+    main()
