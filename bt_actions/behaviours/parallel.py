@@ -13,7 +13,8 @@ from py_trees.composites import Parallel as PyTreesParallel
 class Parallel(PyTreesParallel):
     """Succeeds when enough children have; fails as soon as that cannot happen any more.
 
-    Children that still run are stopped then. py_trees' own Parallel fails with the first child that
+    That is decided after each child: those that run are stopped then, and the children behind are
+    not ticked. py_trees' own Parallel fails with the first child that
     does, whatever the policy, and starts finished children again unless told otherwise.
 
     Args:
@@ -35,15 +36,16 @@ class Parallel(PyTreesParallel):
             self.current_child = None
             self.initialise()
             self.status = Status.RUNNING  # should a child raise, `stop` is to reach the others
+        needed = len(self.children) if self.at_least is None else self.at_least
+        count = Counter(child.status for child in self.children)
+        status = self._decide(count, needed)
         for child in self.children:
             if child.status not in (Status.SUCCESS, Status.FAILURE):
                 yield from child.tick()
-        needed = len(self.children) if self.at_least is None else self.at_least
-        count = Counter(child.status for child in self.children)
-        done, failed = count[Status.SUCCESS], count[Status.FAILURE]
-        self.feedback_message = f"{done} of {needed} succeeded, {failed} failed"
-        enough, possible = done >= needed, len(self.children) - failed >= needed
-        status = Status.SUCCESS if enough else Status.RUNNING if possible else Status.FAILURE
+                count[child.status] += 1
+                status = self._decide(count, needed)
+            if status is not Status.RUNNING:
+                break
         for child in self.children:
             if child.status is status:
                 self.current_child = child
@@ -51,3 +53,10 @@ class Parallel(PyTreesParallel):
             self.stop(status)
         self.status = status
         yield self
+
+    def _decide(self, count: Counter[Status], needed: int) -> Status:
+        """Return what follows from how many children have ended how."""
+        done, failed = count[Status.SUCCESS], count[Status.FAILURE]
+        self.feedback_message = f"{done} of {needed} succeeded, {failed} failed"
+        enough, possible = done >= needed, len(self.children) - failed >= needed
+        return Status.SUCCESS if enough else Status.RUNNING if possible else Status.FAILURE

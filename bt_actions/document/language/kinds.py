@@ -178,7 +178,8 @@ def _all() -> Iterable[Kind]:
     )
     yield _composite(
         "parallel",
-        "Ticks its children beside each other. A child that has finished is not started again.",
+        "Ticks its children beside each other. A child that has finished is not started again; "
+        "none is begun once the node has succeeded or failed, which is decided after each.",
         "parallel: Look and listen\nchildren:\n  - success: Look\n  - success: Listen",
         Key("policy", _POLICY, "How many must succeed; the rest is then stopped.", default="all"),
     )
