@@ -80,7 +80,14 @@ class Recorded:
     @property
     def size(self) -> int:
         """Bytes of all its files."""
-        return sum(each.stat().st_size for each in self.parts if each.exists())
+        return sum(map(_size, self.parts))
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:  # somebody is removing it
+        return 0
 
 
 def home() -> Path:
@@ -162,14 +169,19 @@ def recorded(where: Path | None = None) -> list[Recorded]:
     """Return all recorded runs of this user, the newest first."""
     folder = home() if where is None else where
     try:
-        firsts = [each / FIRST for each in folder.iterdir() if (each / FIRST).is_file()]
+        found = [run for each in folder.iterdir() if (run := _seen(each / FIRST)) is not None]
     except OSError:
         return []
-    found = [
-        Recorded(first, read_summary(first) or _guessed(first), is_written(first))
-        for first in firsts
-    ]
     return sorted(found, key=lambda each: each.summary.began, reverse=True)
+
+
+def _seen(first: Path) -> Recorded | None:
+    try:
+        if not first.is_file():
+            return None
+        return Recorded(first, read_summary(first) or _guessed(first), is_written(first))
+    except OSError:  # of another user, or somebody is removing it
+        return None
 
 
 def _guessed(first: Path) -> Summary:

@@ -8,8 +8,10 @@ since the last batch.
 from __future__ import annotations
 
 import contextlib
+import shutil
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,6 +91,7 @@ class Recorder:
     def _let_go(self, run: _Run) -> None:
         with self._lock:
             self._runs.remove(run)
+        run.end()
         if run.first is not None:
             with contextlib.suppress(OSError):
                 finish_beside(run.first, may_wait=not self._runs)
@@ -124,7 +127,16 @@ class _Run:
         """The first file, once the run has begun."""
 
     def step(self, now: float, *, last: bool) -> bool:
-        """Write what has come until now; return whether nothing more comes."""
+        """Write what has come until now; return whether nothing more is written."""
+        try:
+            return self._write(now, last=last)
+        except Exception as error:  # noqa: BLE001 - a bug, from which no other run may suffer
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            place = f"{where.filename}:{where.lineno}"
+            self._say(f"this run is not recorded any further: {error!r} ({place})")
+            return True
+
+    def _write(self, now: float, *, last: bool) -> bool:
         done, at = last, self._stream.now()
         events = [*self._later, *self._reader.take()]
         self._later = [each for each in events if each.at.steady > at[0] and not last]
@@ -142,8 +154,6 @@ class _Run:
                 writer.beat(*at, 0.0 if began is None else max(0.0, at[0] - began))
             writer.flush()
             done = done or bool(writer.failed)
-        if done:
-            self._end()
         return done
 
     def _take(self, event: Event) -> None:
@@ -154,35 +164,41 @@ class _Run:
 
     def _begin(self, began: RunBegan) -> bool:
         """Make the run's files; say it where that cannot be done."""
-        wish = self._wish
+        wish, made = self._wish, contextlib.ExitStack()
         try:
-            first = wish.first
-            if first is None:
-                where = home() if wish.where is None else wish.where
-                first = folder_for(began.run_id, began.tree, began.at.wall, where) / FIRST
-            self._locks.enter_context(held(first.parent))
-            self._writer = RunWriter(first, began, values=wish.values, say=self._say)
-            self._locks.enter_context(held(first, alone=True, waits=True))
-            self.first = first
-            write_summary(first, _summary(began))
+            with made:  # is removed again where the beginning fails
+                first = wish.first
+                if first is None:
+                    where = home() if wish.where is None else wish.where
+                    first = folder_for(began.run_id, began.tree, began.at.wall, where) / FIRST
+                    made.callback(shutil.rmtree, first.parent, ignore_errors=True)
+                self._locks.enter_context(held(first.parent))
+                writer = RunWriter(first, began, values=wish.values, say=self._say)
+                made.callback(first.unlink)
+                made.callback(writer.close)
+                self._locks.enter_context(held(first, alone=True, waits=True))
+                write_summary(first, _summary(began))
+                made.pop_all()
         except OSError as error:
             remedy = "set XDG_STATE_HOME to a folder that can be written, or say --no-record"
             folder = f"{error.filename}: {error.strerror}"
             self._say(f"this run is not recorded: {folder}; {remedy}")
             return False
+        self.first, self._writer = first, writer
         for event in self._early:
             self._writer.add(event)
         self._early.clear()
         return True
 
-    def _end(self) -> None:
+    def end(self) -> None:
+        """Close the files, and let go of all."""
         self._stream.leave(self._reader)
-        if self._writer is not None and self.first is not None:
-            with contextlib.suppress(OSError):  # which was said where it matters: of the events
-                self._writer.close()
-                if self._writer.state.began is not None:
-                    write_summary(self.first, summary(self._writer.state))
-        self._locks.close()
+        with self._locks:
+            if self._writer is not None and self.first is not None:
+                with contextlib.suppress(OSError):  # which was said where it matters: of the events
+                    self._writer.close()
+                    if self._writer.state.began is not None:
+                        write_summary(self.first, summary(self._writer.state))
 
 
 def _summary(began: RunBegan) -> Summary:

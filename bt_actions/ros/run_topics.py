@@ -7,10 +7,10 @@ subscription is sent a state that the next event follows. Without subscriptions 
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from bt_actions_interfaces.msg import RunEvent, RunState, RunStates
@@ -60,6 +60,7 @@ class RunTopics:
     """
 
     def __init__(self, node: Node, *, values: bool = False) -> None:
+        self._context = node.context
         participant = NodeParticipant.of(node)
         self._events = participant.publisher(RunEvent, "~/events", "events")
         self._states = participant.publisher(RunStates, "~/tree", "latched")
@@ -84,8 +85,11 @@ class RunTopics:
     # On the thread of the topics
 
     def _step(self, last: bool) -> None:
-        with contextlib.suppress(Exception):  # the context was shut down before
+        try:
             self._publish(time.monotonic())
+        except RuntimeError:  # RCLError, which is public nowhere
+            if self._context.ok():
+                raise
 
     def _publish(self, now: float) -> None:
         heard, watched = self._events.listeners, self._states.listeners
@@ -120,8 +124,8 @@ class _Run:
     def __init__(self, stream: Stream, poke: Callable[[], None], *, values: bool) -> None:
         self._stream, self._values = stream, values
         self._reader = stream.reader(poke)
-        self._early: list[Event] = []
-        """What came before the run began, and so before its id."""
+        self._waiting: deque[Event] = deque()
+        """What nobody was told of: it came before the run began, and so before its id."""
         self._id: list[int] = []
         self.state = State()
         self.over = False
@@ -129,16 +133,16 @@ class _Run:
         self._standing = RunState()
         """How the run stood when somebody last wanted to know."""
 
-    def take(self) -> list[Event]:
-        """Return what has come since the last call, once the run's id is known."""
-        events, self._early = self._early + self._reader.take(), []
+    def take(self) -> Iterator[Event]:
+        """Yield what has come, once the run's id is known."""
+        self._waiting += self._reader.take()
         if not self._id:
-            began = next((each for each in events if isinstance(each, RunBegan)), None)
+            began = next((each for each in self._waiting if isinstance(each, RunBegan)), None)
             if began is None:
-                self._early = events
-                return []
+                return
             self._id = _bytes(began)
-        return events
+        while self._waiting:
+            yield self._waiting.popleft()
 
     def fold(self, event: Event) -> Event | None:
         """Take in an event; return what subscribers may know of it."""

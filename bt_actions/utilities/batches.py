@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
+import traceback
 from collections.abc import Callable
 
 BATCH = 0.05
@@ -15,7 +17,8 @@ BEAT = 1.0
 class Batches:
     """Calls `step` on a thread of its own, from `start` until `close`.
 
-    `step` is told whether it is called for the last time, and must not raise.
+    `step` is told whether it is called for the last time. What it raises is logged: others have
+    work for the same thread.
     """
 
     def __init__(self, name: str, step: Callable[[bool], None]) -> None:
@@ -42,7 +45,11 @@ class Batches:
         while True:
             last = self._closing
             self._news.clear()
-            self._step(last)
+            try:
+                self._step(last)
+            except Exception:  # noqa: BLE001 - a bug
+                name, told = self._thread.name, traceback.format_exc()
+                logging.getLogger("bt_actions").error("the thread %s goes on after %s", name, told)
             if last:
                 return
             self._news.wait(BEAT)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 
+from bt_actions.recording import folders
 from bt_actions.recording.folders import (
     FIRST,
     NoRun,
@@ -91,6 +93,41 @@ def test_what_is_written_or_followed_is_never_removed(tmp_path: Path) -> None:
         assert numbers(tmp_path) == [1]
     prune(tmp_path, succeeded=0)
     assert numbers(tmp_path) == []
+
+
+def test_a_folder_that_cannot_be_looked_into_hides_no_other_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stat(path: Path, **options: bool) -> os.stat_result:
+        if path == other / FIRST:
+            raise PermissionError(13, "Permission denied", str(path))
+        return real(path, **options)
+
+    real = Path.stat
+    other = tmp_path / "of another user"
+    other.mkdir()
+    for number in range(3):
+        made(tmp_path, number)
+    monkeypatch.setattr(Path, "stat", stat)
+    assert len(recorded(tmp_path)) == 3
+    assert len(prune(tmp_path, succeeded=1)) == 2
+
+
+def test_a_run_that_somebody_else_removes_meanwhile_is_passed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def removed(first: Path) -> None:
+        shutil.rmtree(first.parent)
+
+    made(tmp_path, 1)
+    monkeypatch.setattr(folders, "read_summary", removed)
+    assert recorded(tmp_path) == []
+    monkeypatch.undo()
+    first = made(tmp_path, 2)
+    [run] = recorded(tmp_path)
+    monkeypatch.setattr(folders, "parts_of", lambda first: [first, first.with_name("gone.mcap")])
+    monkeypatch.setattr(Path, "exists", lambda path: True)
+    assert run.size == first.stat().st_size
 
 
 def test_what_lies_there_and_is_no_run_stays(tmp_path: Path) -> None:

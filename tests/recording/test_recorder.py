@@ -24,6 +24,7 @@ from bt_actions.events import (
     VariableWritten,
 )
 from bt_actions.events.stream import Stream
+from bt_actions.recording import recorder as recorder_module
 from bt_actions.recording.finishing import is_finished
 from bt_actions.recording.folders import SUCCEEDED, is_written, read_summary, recorded
 from bt_actions.recording.reading import Recording
@@ -178,6 +179,56 @@ def test_a_folder_that_cannot_be_made_is_said_once(tmp_path: Path, said: list[st
     assert len(said) == 1
     assert "not recorded" in said[0]
     assert not stream.is_read
+
+
+@pytest.mark.parametrize("wish", ["where", "first"])
+def test_a_beginning_that_fails_leaves_nothing(
+    tmp_path: Path, said: list[str], wish: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device", "run.json")
+
+    monkeypatch.setattr(recorder_module, "write_summary", full)
+    path = tmp_path if wish == "where" else tmp_path / "mine.mcap"
+    recorder, stream = Recorder(Wish(**{wish: path}), said.append), Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    end(stream)
+    recorder.close()
+    assert len(said) == 1
+    assert "No space left on device" in said[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_is_in_the_way_stays(tmp_path: Path, said: list[str]) -> None:
+    path = tmp_path / "mine.mcap"
+    path.write_text("precious")
+    recorder, stream = Recorder(Wish(first=path), said.append), Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    recorder.close()
+    assert "not recorded" in said[0]
+    assert path.read_text() == "precious"
+
+
+def test_a_bug_in_the_recording_of_one_run_costs_no_other_run_anything(
+    recorder: Recorder, tmp_path: Path, said: list[str]
+) -> None:
+    one, other = Stream(Clock()), Stream(Clock())
+    recorder.record(one, lambda: 1 / 0)
+    recorder.record(other, lambda: None)
+    begin(one, "aa" * 16)
+    until(lambda: not one.is_read, what="it is given up")
+    begin(other, "bb" * 16)
+    end(other)
+    until(lambda: not other.is_read)
+    recorder.close()
+    assert len(said) == 1
+    assert "not recorded any further: ZeroDivisionError" in said[0]
+    runs = {run.summary.run_id[:2]: run for run in recorded(tmp_path)}
+    assert runs["bb"].summary.status == "SUCCESS"
+    assert not runs["aa"].is_written
+    assert Recording(runs["aa"].first).state().began is not None
 
 
 def test_a_run_that_somebody_stopped_has_not_failed(recorder: Recorder, tmp_path: Path) -> None:

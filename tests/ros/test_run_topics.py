@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import logging
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -11,6 +12,7 @@ from unittest.mock import Mock
 
 import pytest
 from bt_actions_interfaces.msg import RunEvent
+from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -241,6 +243,49 @@ def test_to_close_publishes_what_has_come(
     hears(lambda: len(listener.events) == len(run.told))
     assert any(each.kind == RunEnded.__name__ for each in listener.events)
     assert ours.count_publishers(f"{ours.get_fully_qualified_name()}/events") == 0
+
+
+@pytest.fixture
+def logged(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What is logged of bugs."""
+    lines = list[str]()
+    monkeypatch.setattr(
+        logging.getLogger("bt_actions"), "error", lambda text, *told: lines.append(text % told)
+    )
+    return lines
+
+
+def test_an_event_that_cannot_be_published_is_logged_and_costs_no_other_one(
+    topics: RunTopics,
+    listen: Callable[[], Listener],
+    hears: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    logged: list[str],
+) -> None:
+    def line(event: Event) -> str:
+        return str(1 / 0) if event.at.number == 3 else to_line(event)
+
+    monkeypatch.setattr(run_topics, "to_line", line)
+    listener, run = listen(), Run()
+    hears(lambda: listener.trees)
+    topics.follow(run.stream)
+    run.tell(*EVENTS)
+    hears(lambda: listener.numbers[-1:] == [len(run.told)])
+    assert listener.numbers == [each.at.number for each in run.told if each.at.number != 3]
+    assert ["ZeroDivisionError" in each for each in logged] == [True]
+
+
+def test_in_a_context_that_was_shut_down_nothing_is_said(domain: int, logged: list[str]) -> None:
+    context = Context()
+    context.init(domain_id=domain)
+    node = Node("short_lived", context=context)
+    topics, run = RunTopics(node), Run()
+    topics.follow(run.stream)
+    context.shutdown()
+    run.tell(*EVENTS)
+    topics.close()
+    node.destroy_node()
+    assert logged == []
 
 
 def test_the_state_is_kept_for_who_comes_late_and_events_are_not(
