@@ -51,8 +51,11 @@ def finish(first: Path) -> bool:
 
     Each file is replaced as a whole; one that is damaged stays as it is. Raises OSError.
     """
-    with held(first.parent), held(first, alone=True) as alone:
-        done = [is_finished(part) or _rewrite(part) for part in (parts_of(first) if alone else ())]
+    with held(first.parent, waits=True), held(first, alone=True) as alone:
+        parts = (
+            reversed(parts_of(first)) if alone else ()
+        )  # a file that is replaced is held no more
+        done = [is_finished(part) or _rewrite(part) for part in parts]
     return alone and all(done)
 
 

@@ -229,19 +229,20 @@ def find(text: str = "", where: Path | None = None) -> Path:
 
 @contextlib.contextmanager
 def held(path: Path, *, alone: bool = False, waits: bool = False) -> Iterator[bool]:
-    """Hold a folder, so that nobody removes it, or a first file, so that nobody else writes it.
+    """Hold a folder, so that nobody removes it, or alone a first file, which its writer holds.
 
-    With `alone`, yield whether nobody else holds it, now or, with `waits`, in the end. Raises
-    OSError.
+    Yield whether it is held: not where somebody holds it alone, or with `alone` at all, unless the
+    caller waits for that to end. Raises OSError.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
+        how = fcntl.LOCK_EX if alone else fcntl.LOCK_SH
         try:
-            how = fcntl.LOCK_EX if alone else fcntl.LOCK_SH
             fcntl.flock(descriptor, how | (0 if waits else fcntl.LOCK_NB))
-            yield True
+            is_held = True
         except BlockingIOError:
-            yield False
+            is_held = False
+        yield is_held
     finally:
         os.close(descriptor)
 
@@ -249,8 +250,8 @@ def held(path: Path, *, alone: bool = False, waits: bool = False) -> Iterator[bo
 def is_written(first: Path) -> bool:
     """Whether a process writes the run, or finishes its files."""
     try:
-        with held(first, alone=True) as alone:
-            return not alone
+        with held(first) as is_free:  # not alone: nobody who asks is taken for a writer
+            return not is_free
     except OSError:
         return False
 

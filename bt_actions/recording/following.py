@@ -25,7 +25,7 @@ class Follower:
     def __init__(self, first: Path) -> None:
         """Raises OSError where there is no such run."""
         self._holds = contextlib.ExitStack()
-        self._holds.enter_context(held(first.parent))
+        self._holds.enter_context(held(first.parent, waits=True))
         self.recording = Recording(first)
         """What is known of the run so far beside its events: files, heartbeat, damage."""
         self._part, self._inode = first, 0

@@ -172,7 +172,7 @@ class _Run:
                     where = home() if wish.where is None else wish.where
                     first = folder_for(began.run_id, began.tree, began.at.wall, where) / FIRST
                     made.callback(shutil.rmtree, first.parent, ignore_errors=True)
-                self._locks.enter_context(held(first.parent))
+                self._locks.enter_context(held(first.parent, waits=True))
                 writer = RunWriter(first, began, values=wish.values, say=self._say)
                 made.callback(first.unlink)
                 made.callback(writer.close)

@@ -78,7 +78,7 @@ class TestRuns:
     def test_that_go_on_say_so_and_have_not_failed(
         self, four: dict[str, Path], capsys: Out
     ) -> None:
-        with held(four["killed"]):
+        with held(four["killed"], alone=True):
             main(["runs"])
             assert "goes on" in capsys.readouterr().out
             main(["runs", "--failed"])
@@ -144,7 +144,7 @@ class TestRuns:
         assert len(list(home().iterdir())) == 20
 
     def test_are_all_removed_but_those_that_go_on(self, four: dict[str, Path], capsys: Out) -> None:
-        with held(four["killed"]):
+        with held(four["killed"], alone=True):
             main(["runs", "prune", "--all"])
         assert [each / "run.mcap" for each in home().iterdir()] == [four["killed"]]
 

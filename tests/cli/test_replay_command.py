@@ -193,7 +193,7 @@ def test_the_run_of_a_killed_process_ends_where_its_recording_does(
     lines = capsys.readouterr().out.splitlines()
     assert "the recording ends here: its process was killed" in lines
     assert any(line.startswith("NOT FINISHED after ") for line in lines)
-    with held(first):
+    with held(first, alone=True):
         assert main(["replay", str(first)]) == 0
     assert "the recording ends here: the run goes on\n" in capsys.readouterr().out
     assert main(["replay", "--json", str(first)]) == 0

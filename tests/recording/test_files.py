@@ -26,9 +26,9 @@ from bt_actions.events import (
     wire,
 )
 from bt_actions.events.bare import bare
-from bt_actions.recording import mcap_records, writing
+from bt_actions.recording import finishing, mcap_records, writing
 from bt_actions.recording.finishing import finish, is_finished
-from bt_actions.recording.folders import parts_of
+from bt_actions.recording.folders import is_written, parts_of
 from bt_actions.recording.reading import Recording, RecordingError
 from bt_actions.recording.writing import RunWriter
 from bt_actions.story.state import State
@@ -122,6 +122,21 @@ def test_a_state_that_is_longer_than_a_file_begins_no_file_with_each_event(tmp_p
     written(tmp_path / "run.mcap", events, size=100, files=1000)
     assert 2 < len(parts_of(tmp_path / "run.mcap")) < len(events) / 5
     assert told(read(tmp_path / "run.mcap")) == told(events)
+
+
+def test_a_run_is_held_until_the_last_of_its_files_is_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, rewrite, seen = tmp_path / "run.mcap", finishing._rewrite, list[bool]()
+    written(first, every_kind(rounds=40), size=60_000)
+
+    def watched(part: Path) -> bool:
+        seen.append(is_written(first))
+        return rewrite(part)
+
+    monkeypatch.setattr(finishing, "_rewrite", watched)
+    assert finish(first)
+    assert seen == [True] * len(parts_of(first))
 
 
 @pytest.mark.parametrize("finished", [False, True])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shutil
+import threading
 from pathlib import Path
 
 import pytest
@@ -17,12 +19,14 @@ from bt_actions.recording.folders import (
     folder_for,
     held,
     home,
+    is_written,
     prune,
     read_summary,
     recorded,
     summary_of,
     write_summary,
 )
+from bt_actions.recording.following import Follower
 
 
 def made(
@@ -85,12 +89,11 @@ def test_all_together_are_bounded_in_bytes(tmp_path: Path) -> None:
 
 
 def test_what_is_written_or_followed_is_never_removed(tmp_path: Path) -> None:
-    first = made(tmp_path, 1)
-    made(tmp_path, 2)
-    with held(first.parent) as is_ours:
-        assert is_ours
+    followed, written = made(tmp_path, 1), made(tmp_path, 2)
+    made(tmp_path, 3)
+    with held(followed.parent), held(written, alone=True):
         prune(tmp_path, succeeded=0)
-        assert numbers(tmp_path) == [1]
+        assert numbers(tmp_path) == [1, 2]
     prune(tmp_path, succeeded=0)
     assert numbers(tmp_path) == []
 
@@ -155,6 +158,45 @@ def test_a_summary_shows_nothing_that_a_terminal_obeys(tmp_path: Path) -> None:
     summary = read_summary(first)
     assert summary is not None
     assert (summary.tree, summary.cause.strip()) == (" [31mred ", "")
+
+
+class TestLocks:
+    def test_those_who_ask_whether_a_run_is_written_do_not_see_each_other(
+        self, tmp_path: Path
+    ) -> None:
+        first = made(tmp_path, 1)
+        with held(first) as is_free:
+            assert is_free
+            assert not is_written(first)
+        with held(first, alone=True):
+            assert is_written(first)
+
+    def test_an_error_within_comes_out_as_it_is(self, tmp_path: Path) -> None:
+        with pytest.raises(BlockingIOError, match="full"), held(tmp_path):
+            raise BlockingIOError("full")
+
+    def test_a_reader_waits_for_whoever_removes_the_run(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        first, order, asks, flock = made(tmp_path, 1), list[str](), threading.Event(), fcntl.flock
+
+        def asked(descriptor: int, how: int) -> None:
+            asks.set()
+            flock(descriptor, how)
+
+        def follow() -> None:
+            with Follower(first):
+                order.append("followed")
+
+        reader = threading.Thread(target=follow)
+        with held(first.parent, alone=True):
+            monkeypatch.setattr(fcntl, "flock", asked)
+            reader.start()
+            assert asks.wait(10.0)
+            reader.join(0.1)  # one that does not wait is done by then
+            order.append("removed")
+        reader.join()
+        assert order == ["removed", "followed"]
 
 
 class TestFind:

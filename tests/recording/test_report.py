@@ -207,7 +207,7 @@ def test_a_run_that_goes_on_says_so(story: Story, leaf: FakeNode, tmp_path: Path
 
     events = [story.began, story.goal(leaf, "EXECUTING"), story.node(leaf, Status.RUNNING)]
     first = record(events, tmp_path, killed=2.0)
-    with held(first):
+    with held(first, alone=True):
         said = told(first)
     assert said.startswith("Deliver: goes on\n")
     assert "lived" not in said

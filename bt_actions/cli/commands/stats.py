@@ -76,7 +76,7 @@ def _add(statistics: Statistics, run: Recorded) -> bool:
     from bt_actions.recording.reading import Recording, RecordingError
 
     try:
-        with held(run.first.parent):
+        with held(run.first.parent, waits=True):
             recording = Recording(run.first)
             statistics.add(recording.items())
     except (RecordingError, OSError) as error:

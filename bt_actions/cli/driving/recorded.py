@@ -34,7 +34,7 @@ def reading(run: str) -> Iterator[Recording]:
     try:
         first = find(run)
         _finish(first)
-        with held(first.parent):
+        with held(first.parent, waits=True):
             yield Recording(first)
     except (NoRun, RecordingError) as error:
         raise BadInput(clean(str(error))) from error
