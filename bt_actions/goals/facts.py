@@ -145,9 +145,12 @@ class Facts:
 
     @property
     def fields(self) -> str:
-        """The fields that the goal message gives, in short: ``{distance: 12.0}``; or ""."""
+        """The fields that the goal message gives, in short: ``{distance: 12.0}``; or "".
+
+        Of a goal that is a secret nothing is said.
+        """
         if self.is_secret:
-            return "•••"
+            return ""
         if self.message is None:
             return self._fields_then
         given = given_fields(self.message)

@@ -264,13 +264,13 @@ class State:
 
     def _failure(self, story: NodeStory, message: str) -> Failure:
         number = story.node.id
-        action, above = self._actions.get(number), list(self.above(number))
+        action = self._actions.get(number)
         return Failure(
             story.node,
             self.now or Moment(0, 0.0, 0.0, 0.0),
-            tuple(each.node for each in above),
+            tuple(each.node for each in self.above(number)),
             message,
-            tuple((each.node, each.round) for each in reversed(above) if each.round is not None),
+            self.rounds(number),
             action,
             tuple(action.tried) if action is not None else (),
             tuple(self._failure(each, each.message) for each in self._stopped_below(story)),
@@ -394,6 +394,11 @@ class State:
         while parent is not None and parent in self.nodes:
             yield self.nodes[parent]
             parent = self.nodes[parent].node.parent
+
+    def rounds(self, node: int) -> tuple[tuple[Node, RoundBegan], ...]:
+        """Return the loops that hold a node, each with its latest round, the outermost first."""
+        above = reversed(list(self.above(node)))
+        return tuple((each.node, each.round) for each in above if each.round is not None)
 
     def below(self, node: int) -> Iterator[int]:
         """Yield all nodes below one."""

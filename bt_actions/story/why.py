@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from py_trees.common import Status
 
+from bt_actions.events.kinds import Node, RoundBegan
+from bt_actions.events.snapshot import HIDDEN
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory, GoalStory
 from bt_actions.story.doing import doing
@@ -89,11 +91,10 @@ def why_text(state: State, now: float | None = None) -> str:
 
 def waits(state: State, now: float) -> list[str]:
     """Return for each running leaf, the deepest first, what it does, since and until when."""
-    running = state.running
-    lines = [
-        clean(f"{state.called(each.node.id)}: {doing(state, each, now)}")
-        for each in running[:LINES]
-    ]
+    running, lines = state.running, list[str]()
+    for each in running[:LINES]:
+        name = f"{state.called(each.node.id)}{_items(state.rounds(each.node.id))}"
+        lines.append(clean(f"{name}: {doing(state, each, now)}"))
     more = len(running) - LINES
     return [*lines[:-1], f"and {more + 1} more"] if more > 0 else lines
 
@@ -103,7 +104,7 @@ def waits(state: State, now: float) -> list[str]:
 
 def _told(failure: Failure, state: State) -> Iterator[str]:
     """Yield when, where and in which item it failed; each attempt; who passed it on."""
-    items = _items(failure)
+    items = _items(failure.items)
     yield clean(f"{_clock(failure.at.wall)}  {' / '.join(failure.path)}{items}")
     yield from _attempts(failure)
     for each in failure.below:
@@ -150,7 +151,7 @@ def attempt_text(action: ActionStory, goal: GoalStory) -> str:
     if goal.outcome is not None:
         told = outcome_text(goal.outcome, goal.latest.end, goal.in_doubt)
     told += f": {why_not}" if why_not else ""
-    sent = shorten(opened(goal.goal), LONG) if goal.goal is not None else ""
+    sent = "" if goal.goal in (None, HIDDEN) else shorten(opened(goal.goal), LONG)
     if sent and "goal {" not in told:
         told += f"; goal {sent}"
     if goal.outcome is Outcome.UNEXPECTED_RESULT and goal.result is not None:
@@ -181,7 +182,7 @@ def _dealt_with(state: State) -> Iterator[str]:
     are_all = len(groups) <= 2 and len(state.dealt_with) == state.dealt_with_in_all
     yield f"failed before, and dealt with{'' if are_all else ' (the last 2)'}:"
     for failure, times in list(groups.values())[-2:]:
-        items = _items(failure)
+        items = _items(failure.items)
         last = failure.attempts[-1] if failure.attempts else None
         said, tries = failure.message, ""
         if failure.action is not None and last is not None:
@@ -193,8 +194,8 @@ def _dealt_with(state: State) -> Iterator[str]:
         yield clean(f"  {_clock(failure.at.wall)}  {name}{items}, failed{tries}: {brief(said)}{by}")
 
 
-def _items(failure: Failure) -> str:
-    told = (round_text(begun, f" of {loop.name}") for loop, begun in failure.items)
+def _items(rounds: Iterable[tuple[Node, RoundBegan]]) -> str:
+    told = (round_text(begun, f" of {loop.name}") for loop, begun in rounds)
     return "".join(f", {each}" for each in told)
 
 

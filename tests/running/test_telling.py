@@ -372,7 +372,10 @@ root:
         assert not [line for line in lines if "7777" in line or "7776" in line]
         goals = [e.goal for e in events_of(runner, GoalChanged) if e.goal is not None]
         assert goals == [HIDDEN, HIDDEN]
-        assert not any("7777" in line for line in why(runner.state))
+        told = why(runner.state)
+        assert not any("7777" in line for line in told)
+        assert told[1].startswith("  attempts 1 to 2: ABORTED: aborted by /move_robot; its result")
+        assert "goal" not in told[1], "of a hidden one there is nothing to say"
 
 
 def test_a_reader_that_comes_late_is_told_of_the_tree_first() -> None:

@@ -127,6 +127,16 @@ def test_a_leaf_tells_the_time_that_ends_first_its_own_or_that_of_a_node_that_ho
     assert why(runner.state, runner.now) == told
 
 
+def test_what_runs_in_a_loop_tells_its_item() -> None:
+    rest = FakeNode("Rest", kind="wait")
+    each = FakeNode("Each station", [rest], "for_each")
+    story = Story(each)
+    begins = [story.round(each, 1, 3.0, of=3), story.node(rest, Status.RUNNING)]
+    state = story.told(*begins, story.node(each, Status.RUNNING))
+    told = "Rest, item 2 of 3 of Each station (3.0): running for 2.5 s"
+    assert why(state, story.time + 2.0) == [told]
+
+
 def test_between_two_attempts_a_leaf_tells_when_the_next_begins_and_why() -> None:
     network = VirtualNetwork()
     refusals = iter(["no"])
