@@ -246,21 +246,21 @@ class TickLoop:
     def _tick(self) -> bool:
         """Tick once, and tell whether that changed a status."""
         dog = self.watchdog
-        dog.seen_at, dog.ticks_since = None, self._traffic.host.steady()
+        dog.seen, dog.ticks_since = False, self._traffic.host.steady()
         try:
             self._guarded(lambda: tick_once(self.tree, self._visitor))
         except _Abandoned:
             pass
         finally:
-            dog.ticks_since = None
-            if dog.seen_at is not None:
+            if dog.seen:
                 dog.tick_returned()
+            dog.ticks_since = None
             changed = self._visitor.finish()
             self._tell_observers()
         return changed
 
     def _after_each(self) -> str:
-        if self.watchdog.seen_at is not None:
+        if self.watchdog.seen:
             self.watchdog.tick_returned()
         if self.watchdog.ends_at < math.inf and self.watchdog.gives_up():
             raise _Abandoned

@@ -39,9 +39,10 @@ class Watchdog:
         self.gave_up = False
         """Whether it was so in this run: what the tree says since is of no account."""
         self.ticks_since: float | None = None
-        """When the present tick of the tree began (seconds, steady clock); None between ticks."""
-        self.seen_at: float | None = None
-        """When the present tick of one node was first seen; None where it was not yet."""
+        """When the present tick of the tree began (seconds, steady clock), or within it the tick
+        of a node returned that was seen; None between ticks."""
+        self.seen = False
+        """Whether the present tick of one node was seen."""
         self._lasting: Behaviour | None = None
         """Whose tick was told to last."""
         self._sees_ticks = False
@@ -69,8 +70,10 @@ class Watchdog:
     def tick_returned(self) -> None:
         """Take note that a node's tick is over that was seen."""
         with self._host.lock:
-            self._tell(self._host.steady(), is_over=True)
-            self._lasting = self.seen_at = None
+            now, since = self._host.steady(), self.ticks_since
+            if since is not None:
+                self._tell(now, since, is_over=True)
+            self._lasting, self.seen, self.ticks_since = None, False, now
 
     def run_due(self, now: float) -> float:
         """Tell what lasts, and feedback that came too soon; cancel what an overdue tick leaves.
@@ -91,18 +94,19 @@ class Watchdog:
 
     def _see(self, now: float) -> None:
         """Tell, once, whose tick has not returned for long."""
-        if self.ticks_since is None or self._lasting is not None:
+        since = self.ticks_since  # which the ticking thread sets without the lock
+        if since is None or self._lasting is not None:
             return
-        if self.seen_at is None:
-            self.seen_at = now
-        elif now - self.seen_at >= LASTS:
+        if not self.seen:
+            self.seen = True
+        elif now - since >= LASTS:
             self._lasting = self._innermost()
-            self._tell(now)
+            self._tell(now, since)
 
-    def _tell(self, now: float, *, is_over: bool = False) -> None:
+    def _tell(self, now: float, since: float, *, is_over: bool = False) -> None:
         number = self._teller.numbers.get(self._lasting)
-        if number is not None and self.seen_at is not None:
-            self._teller.stream.add(TickLasts, number, now - self.seen_at, is_over)
+        if number is not None:
+            self._teller.stream.add(TickLasts, number, now - since, is_over)
 
     def _give_up(self) -> None:
         """Warn, and name the innermost behaviour that the ticking thread is in; once."""

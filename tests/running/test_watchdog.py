@@ -112,8 +112,8 @@ class Blocks(py_trees.behaviours.Running):
     def update(self) -> Status:
         end = self.stepped.now + self.seconds
         while self.stepped.now < end:
-            self.stepped.loop.watchdog.run_due(self.stepped.now)
             self.stepped.now += LOOK
+            self.stepped.loop.watchdog.run_due(self.stepped.now)
         return Status.RUNNING
 
 
@@ -126,10 +126,17 @@ def ticks_that_last(*leaves: Blocks) -> list[tuple[str, float, bool]]:
     stepped.step()
     names = {number: leaf.name for leaf, number in stepped.loop.teller.numbers.items()}
     told = [each for each in stepped.told if isinstance(each, TickLasts)]
-    return [(names[each.node], round(each.seconds), each.is_over) for each in told]
+    return [
+        (
+            names[each.node],
+            round(each.seconds, 1) if each.is_over else int(each.seconds),
+            each.is_over,
+        )
+        for each in told
+    ]
 
 
-def test_the_tick_of_a_node_that_lasts_is_told_once_and_when_it_is_over() -> None:
+def test_the_tick_of_a_node_that_lasts_is_told_once_and_its_whole_length_when_it_is_over() -> None:
     told = ticks_that_last(Blocks("quick", 0.4), Blocks("slow", 3.0), Blocks("slower", 4.0))
     assert told == [
         ("slow", LASTS, False),
