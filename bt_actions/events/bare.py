@@ -2,11 +2,12 @@
 
 What stays is which node did what, when, and with which outcome. Goals, results, feedback,
 variables, items, inputs and outputs go, and of each text what may hold values: see `said`. Of what
-nodes say only the outcomes of actions stay: a leaf of the user's may say anything.
+nodes say only the outcomes of actions stay, by their names: a leaf of the user's may say anything.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -30,6 +31,10 @@ from bt_actions.events.snapshot import HIDDEN
 from bt_actions.goals.policy import Outcome
 
 _OUTCOMES = frozenset(each.value for each in Outcome)
+_OF_THE_LEAF = (Outcome.UNEXPECTED_RESULT, Outcome.INVALID_GOAL)
+"""Outcomes whose reason the leaf's own expressions give: it may begin with a value."""
+_VALUE = re.compile(r"\{|: |; ")
+"""What may stand before a value: an action's `explain` follows a semicolon."""
 _SETTINGS = ("timeouts", "attempts", "memory", "constants")
 """Of a node: those that are no values of the robot's."""
 
@@ -42,14 +47,18 @@ def bare(event: Event) -> Event | None:
 
 def said(text: str) -> str:
     """Return a text up to its first value; all that a server or a user's node says is value."""
-    head = text.partition("{")[0]
-    return head.partition(": ")[0].rstrip(" ;,:").removesuffix("; goal")
+    return _VALUE.split(text, 1)[0].rstrip(" ;,:")
 
 
 def outcome_of(message: str) -> str:
-    """Return of a node's message what an action says of its outcome: all else may be value."""
-    head = said(message)
-    return head if head.partition(" ")[0].rstrip(",") in _OUTCOMES else ""
+    """Return of a node's message the outcome of an action, which stands first: else ""."""
+    head = re.split(r"[ :]", message, maxsplit=1)[0]
+    return head if head in _OUTCOMES else ""
+
+
+def reason_of(outcome: Outcome | None, reason: str) -> str:
+    """Return what may be known of why a goal has this outcome."""
+    return "" if outcome in _OF_THE_LEAF else said(reason)
 
 
 def bare_node(node: Node) -> Node:
@@ -63,7 +72,7 @@ def _hidden(values: Any) -> dict[str, Any]:
 
 
 def _goal(event: GoalChanged) -> GoalChanged:
-    return replace(event, goal=None, result=None, reason=said(event.reason))
+    return replace(event, goal=None, result=None, reason=reason_of(event.outcome, event.reason))
 
 
 def _finished(event: TreeFinished) -> TreeFinished:
@@ -78,7 +87,9 @@ _STRIPPED: dict[type[Event], Callable[[Any], Event | None]] = {
     NodesAdded: lambda event: replace(event, nodes=tuple(map(bare_node, event.nodes))),
     NodeChanged: lambda event: replace(event, message=outcome_of(event.message), warning=""),
     GoalChanged: _goal,
-    AttemptEnded: lambda event: replace(event, reason=said(event.reason), seen={}),
+    AttemptEnded: lambda event: replace(
+        event, reason=reason_of(event.outcome, event.reason), seen={}
+    ),
     FeedbackCame: lambda event: None,
     VariableWritten: lambda event: None,
     RoundBegan: lambda event: replace(event, item=None),

@@ -6,11 +6,11 @@ import dataclasses
 from collections import deque
 from typing import Any
 
-from bt_actions.events.bare import bare, bare_node, outcome_of, said
+from bt_actions.events.bare import bare, bare_node, outcome_of, reason_of
 from bt_actions.events.kinds import Event, Moment, Node
 from bt_actions.story.state import State, Warned
 
-_TEXTS = {"message": outcome_of, "warning": lambda text: "", "reason": said}
+_TEXTS = {"message": outcome_of, "warning": lambda text: ""}
 """Fields of a state's parts that may hold values, and what stays of each."""
 _VALUES = ("goal", "result")
 
@@ -55,6 +55,8 @@ class _Stripping:
             value = getattr(held, each.name)
             if each.name in _TEXTS:
                 new[each.name] = _TEXTS[each.name](value)
+            elif each.name == "reason":
+                new[each.name] = reason_of(held.outcome, value)
             else:
                 new[each.name] = None if each.name in _VALUES else self.of(value)
         return dataclasses.replace(held, **new)  # type: ignore[type-var]  # an object, no class
