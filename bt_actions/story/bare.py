@@ -56,7 +56,7 @@ class _Stripping:
             if each.name in _TEXTS:
                 new[each.name] = _TEXTS[each.name](value)
             elif each.name == "reason":
-                new[each.name] = reason_of(held.outcome, value)
+                new[each.name] = reason_of(held.outcome, value)  # type: ignore[union-attr]
             else:
                 new[each.name] = None if each.name in _VALUES else self.of(value)
         return dataclasses.replace(held, **new)  # type: ignore[type-var]  # an object, no class
