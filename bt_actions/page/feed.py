@@ -66,11 +66,12 @@ async def told(
                 sent = True
                 if closing():
                     return
-            if is_due or follower.recording.last_beat != last:
+            # A run that is beginning has its file for a moment before its lock.
+            is_over = not sent and gone and (feed.ended or gone > 1)
+            if is_due or is_over or follower.recording.last_beat != last:
                 last = follower.recording.last_beat
                 yield message("beat", feed.beat(is_written=not gone))
-            # A run that is beginning has its file for a moment before its lock.
-            if not sent and gone and (feed.ended or gone > 1):
+            if is_over:
                 yield message("end", {"to": feed.number, "ended": feed.ended})
                 return
             await asyncio.sleep(POLL)
@@ -89,7 +90,12 @@ class _Feed:
     def beat(self, *, is_written: bool) -> dict[str, Any]:
         """Return what is known of the run's process."""
         recording = self._follower.recording
-        return {"clock": recording.last_beat, "tick": recording.tick, "written": is_written}
+        return {
+            "clock": recording.last_beat,
+            "tick": recording.tick,
+            "written": is_written,
+            "damaged": recording.damaged,
+        }
 
     def batches(self) -> Iterator[dict[str, Any]]:
         """Yield what has come since the last look, each with the numbers that it covers."""
@@ -131,6 +137,7 @@ def known(state: State) -> dict[str, Any]:
         "at": list(state.now),
         "nodes": list(state.nodes),
         "events": [to_plain(event) for event in _leading_to(state)],
+        "visits": [[key, each.number, each.ended] for key, each in state.nodes.items()],
         "pending": pending,
         "dealt": [_failure(each) for each in state.dealt_with],
     }

@@ -172,7 +172,12 @@ def test_a_heartbeat_tells_the_clock_of_the_run_and_how_long_its_tick_lasts(
     run.write(events)
     told = Told(served)
     told.read("beat")
-    assert told.messages[-1][1] == {"clock": None, "tick": 0.0, "written": True}
+    assert told.messages[-1][1] == {
+        "clock": None,
+        "tick": 0.0,
+        "written": True,
+        "damaged": 0,
+    }
     at = events[-1].at
     run.writer.beat(at.steady + 14.0, at.wall + 14.0, at.ros, 13.5)
     run.writer.flush()

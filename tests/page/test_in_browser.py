@@ -364,6 +364,13 @@ def test_what_is_not_recorded_is_said(page: Page, begin: Begin) -> None:
     assert window.run("return document.querySelectorAll('#lanes .missing').length") == 1
 
 
+def test_a_recording_that_is_damaged_is_said_to_be(page: Page) -> None:
+    first = record(told_of(), killed=0.5)
+    first.write_bytes(first.read_bytes().replace(b'"kind":"Logged"', b'"kind":"Bogged"'))
+    page.open()
+    assert "1 of its records is damaged" in page.text("#banner", "damaged")
+
+
 def test_a_page_that_has_taken_much_begins_anew_where_it_is(page: Page, begin: Begin) -> None:
     events = told_of(rounds=9)
     run = begin(events)

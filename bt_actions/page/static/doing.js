@@ -1,7 +1,7 @@
 // What a node does at one time, since when, until when and by which rule: bt_actions/story/doing.py says the same.
 
 import { DEADLINE, secs, clock } from "./words.js";
-import { upper } from "./state.js";
+import { upper, is_begun } from "./state.js";
 
 export const phase_at = (a, t) => (a.done <= t ? null : a.phases.findLast((phase) => phase.from <= t) || null);
 export const last_feedback = (a, t) => { const i = upper(a.fb, t, (e) => e.t); return i ? a.fb[i - 1] : null; };
@@ -48,12 +48,8 @@ export function view(run, n, s) {
   return seen;
 }
 
-// Whether how a node stands is from before what holds it has begun anew: of an earlier round of a loop.
-export function is_old(run, n, s) {
-  if (s.status[n] === "running" || s.status[n] === "idle") return false;
-  for (let up = run.nodes[n].parent; up >= 0; up = run.nodes[up].parent) if (s.told[n] < s.ended[up]) return true;
-  return false;
-}
+// Whether how a node stands is from before what holds it has begun anew, as in an earlier round of a loop.
+export const is_old = (run, n, s) => !["running", "idle"].includes(s.status[n]) && !is_begun(s, n, run.nodes);
 
 // The nearest loop round or subtree above, to tell nodes of one name apart.
 export function branch_of(run, n, s) {

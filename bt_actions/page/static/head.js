@@ -70,7 +70,7 @@ export function create_head(app) {
   function banner(now, ago) {
     const { run, link } = app, box = find("banner");
     const killed = now === "replay" && !link.ended && run.began ? "killed" : "", broken = link.why ? "lost" : "";
-    const tone = broken || (killed ? "stale" : now === "stale" || now === "lost" ? now : "");
+    const tone = broken || (killed ? "stale" : now === "stale" || now === "lost" ? now : link.damaged ? "stale" : "");
     if (box.dataset.k !== tone + now) {
       box.dataset.k = tone + now;
       box.className = tone;
@@ -78,8 +78,10 @@ export function create_head(app) {
     }
     if (!tone) return;
     const last = `As of ${clock(run.clock)}`, next = Math.max(0, Math.ceil((link.next - performance.now()) / 1000));
+    const hurt = link.damaged ? ` ${link.damaged} of its records ${link.damaged === 1 ? "is" : "are"} damaged: something may be missing.` : "";
     const words = broken ? `The recording cannot be read: ${link.why}`
-      : killed ? `The recording ends at ${clock(run.clock)}: its process was killed, and what ran then may still run.`
+      : killed ? `The recording ends at ${clock(run.clock)}: its process was killed, and what ran then may still run.${hurt}`
+        : hurt && !["stale", "lost"].includes(now) ? `The recording:${hurt}`
         : now === "lost" ? `${last}; ${next ? `next try in ${next} s` : "trying"}. What is missed is filled in.`
           : link.tick > 2 ? `${last}: the tick of the tree lasts for ${Math.floor(link.tick + ago)} s.` : `${last}: nothing has come since, not even a heartbeat.`;
     text(box.firstChild, words);

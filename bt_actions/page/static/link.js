@@ -7,7 +7,7 @@ const STALE = 2.5, AHEAD = 1.2, LONGEST = 15;
 
 export class Link {
   constructor(run, told) {
-    Object.assign(this, { run, told, conn: "lost", silence: 0, ended: false, tick: 0, why: "", head: 0, signed: performance.now(), last_beat: null, tries: 0, next: 0, retry: 0 });
+    Object.assign(this, { run, told, conn: "lost", silence: 0, ended: false, tick: 0, damaged: 0, why: "", head: 0, signed: performance.now(), last_beat: null, tries: 0, next: 0, retry: 0 });
     this.open();
   }
 
@@ -21,11 +21,11 @@ export class Link {
       this.sign(run.clock);
     });
     source.addEventListener("beat", ({ data }) => {
-      const { clock, tick, written } = JSON.parse(data);
+      const { clock, tick, damaged } = JSON.parse(data);
       this.tries = 0;
       this.tick = tick;
       this.is_open = true;
-      this.written = written;
+      this.damaged = damaged;
       if (clock !== null && clock !== this.last_beat && run.began) {
         this.last_beat = clock;
         this.sign(Math.max(run.clock, clock - run.began[2]));

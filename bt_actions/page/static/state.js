@@ -86,6 +86,7 @@ const FOLD = {
     const { i, t, lost } = s;
     Object.assign(s, new State(nodes.length), { i, t, lost });
     for (const inner of e.events) FOLD[inner.kind]?.(s, inner, nodes);
+    for (const [n, told, ended] of e.visits) { s.told[n] = told; s.ended[n] = ended; }
     s.number = e.at[0];
     s.pending = new Map(e.pending.map(([n, failures]) => [n, failures]));
     s.dealt = e.dealt;
@@ -116,6 +117,12 @@ function deal_with(s, failures, by, nodes) {
   if (!failures || by < 0 || nodes[by].kind === "invert") return;    // to which it is no failure
   s.dealt = [...s.dealt, ...failures.map((one) => ({ ...one, by }))].slice(-KEPT);
   s.dealt_in_all += failures.length;
+}
+
+// Whether a node did anything in the latest visits, and rounds, of all that holds it.
+export function is_begun(s, n, nodes) {
+  for (let up = nodes[n].parent; up >= 0; up = nodes[up].parent) if (s.told[n] <= s.ended[up] || s.told[n] <= (s.round.get(up)?.at[0] ?? 0)) return false;
+  return true;
 }
 
 export function upper(list, t, key) {

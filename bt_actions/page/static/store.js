@@ -66,6 +66,7 @@ export class Run {
     const known = (all) => all.filter((one) => slot(one.node) !== undefined).map((one) => ({ n: slot(one.node), t: Math.max(0, one.at[1] - this.began[1]), number: one.at[0], message: one.message, by: slot(one.by) ?? null }));
     e.pending = Object.entries(e.pending).map(([id, all]) => [slot(+id), known(all)]);
     e.dealt = known(e.dealt);
+    e.visits = e.visits.map(([id, told, ended]) => [slot(id), told, ended]);
     this.missing.push({ from: this.clock, to: e.t });
   }
 
