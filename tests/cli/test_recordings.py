@@ -266,6 +266,17 @@ class TestReport:
 # Real runs
 
 
+@pytest.mark.parametrize("name", ["m.mcap", "m.json", "m.1.mcap", "m.12.mcap"])
+def test_a_file_of_another_run_is_neither_replaced_nor_mixed_in(
+    tmp_path: Path, name: str, capsys: Out
+) -> None:
+    (tmp_path / name).write_text("mine")
+    (tmp_path / "tree.yaml").write_text("tree: mine\nroot:\n  log: done\n")
+    assert main(["run", str(tmp_path / "tree.yaml"), "--record", str(tmp_path / "m.mcap")]) == 2
+    assert f"{tmp_path / name} exists" in capsys.readouterr().err
+    assert (tmp_path / name).read_text() == "mine"
+
+
 def recordings() -> list[Path]:
     return sorted(home().glob("*/run.mcap"))
 

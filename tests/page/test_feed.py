@@ -240,11 +240,11 @@ def test_a_browser_that_stops_reading_has_no_more_read_for_it(
         assert read[0] < len(events) + 10 * MOST < 1.5 * len(events)
 
 
-def test_a_file_that_is_no_recording_ends_at_once(served: Served) -> None:
+def test_a_file_that_is_no_recording_is_said_to_be_none(served: Served) -> None:
     record(told_of()).write_bytes(b"no mcap, by far")
     told = Told(served)
-    assert told.read() == []
-    assert told.messages[-1] == ("end", {"to": 0, "ended": False})
+    assert told.read("broken") == []
+    assert "no MCAP file" in told.messages[-1][1]["why"]
 
 
 def test_a_recording_that_cannot_be_read_is_told_of_in_words(

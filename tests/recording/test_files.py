@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 import tracemalloc
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -166,6 +167,21 @@ def test_the_first_file_alone_does_not_end_as_the_run_did(tmp_path: Path) -> Non
     assert last_words(Recording(first).state()) != last_words(state_of(events))
 
 
+def test_a_file_that_another_run_left_is_no_part_of_it(tmp_path: Path) -> None:
+    first, events = tmp_path / "m[1].mcap", every_kind()
+    other: list[Event] = [
+        replace(each, run_id="0f" * 16) if isinstance(each, RunBegan) else each
+        for each in every_kind(rounds=40)
+    ]
+    written(first, other, size=60_000)
+    assert len(parts_of(first)) > 2
+    first.unlink()
+    written(first, events)
+    recording = Recording(first)
+    assert told(list(recording.items())) == told(list[Event | State](events))
+    assert recording.damaged == 0
+
+
 def test_feedback_of_a_long_run_is_thinned_and_that_is_said_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -274,6 +290,34 @@ def test_one_damaged_byte_costs_one_message(
         assert len(missing) <= 1, f"byte {at}"
         in_order = iter(items)  # a damaged one may read as another one, or as one more
         assert all(each in in_order for each in before if each not in missing), f"byte {at}"
+
+
+@pytest.mark.parametrize("times", [1, 3])
+def test_what_stands_twice_in_a_file_is_read_once_and_counted(
+    tmp_path: Path, sample: tuple[bytes, list[Event]], times: int
+) -> None:
+    data, events = sample
+    ends = ends_of_records(data)
+    tail = data[next(end for end in ends if data[end] == mcap_records.MESSAGE) :]
+    (tmp_path / "run.mcap").write_bytes(data + times * tail)
+    recording = Recording(tmp_path / "run.mcap")
+    assert told(list(recording.items())) == told(list[Event | State](events))
+    assert recording.damaged >= times * len(events)
+
+
+def test_the_event_behind_lost_ones_has_their_number_and_is_read(tmp_path: Path) -> None:
+    lost = EventsLost(every_kind()[4].at, 3)
+    events = [*every_kind()[:4], lost, *every_kind()[4:]]
+    written(tmp_path / "run.mcap", events)
+    assert told(read(tmp_path / "run.mcap")) == told(list[Event | State](events))
+
+
+def test_a_number_that_is_far_ahead_costs_none_that_follow(tmp_path: Path) -> None:
+    events = every_kind(rounds=3)
+    at = events[30].at
+    events[30] = replace(events[30], at=at._replace(number=at.number + 2**40))
+    written(tmp_path / "run.mcap", events)
+    assert told(read(tmp_path / "run.mcap")) == told(list[Event | State](events))
 
 
 @pytest.mark.parametrize("finished", [False, True])

@@ -161,7 +161,10 @@ def test_attachments_beyond_a_size_are_passed_over(
 def test_goals_that_never_end_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     events = every_kind()
     goal = next(each for each in events if isinstance(each, GoalChanged))
-    more = [replace(goal, goal_id=f"{number:032x}") for number in range(60)]
+    more = [
+        replace(goal, at=goal.at._replace(number=9 + number), goal_id=f"{number:032x}")
+        for number in range(60)
+    ]
     path = raw(tmp_path / "run.mcap", map(to_line, [*events[:3], *more]))
     assert whole(path).startswith("all: never finished")
     monkeypatch.setattr(reading, "MOST_NAMES", 50)

@@ -26,7 +26,7 @@ from bt_actions.events import (
 from bt_actions.events.stream import Stream
 from bt_actions.recording import recorder as recorder_module
 from bt_actions.recording.finishing import is_finished
-from bt_actions.recording.folders import SUCCEEDED, is_written, read_summary, recorded
+from bt_actions.recording.folders import SUCCEEDED, home, is_written, read_summary, recorded
 from bt_actions.recording.reading import Recording
 from bt_actions.recording.recorder import BEAT, Recorder, Wish
 from tests.support.every_kind import NODES, RUN_ID
@@ -157,7 +157,13 @@ def test_the_log_s_time_never_goes_back_though_the_clock_does(
     assert found[0].publish_time - found[-1].publish_time > 3590 * 10**9
 
 
-def test_a_process_of_many_runs_keeps_the_last_of_them(recorder: Recorder, tmp_path: Path) -> None:
+@pytest.mark.parametrize("named", [False, True], ids=["at home", "in a folder that was named"])
+def test_a_process_of_many_runs_keeps_the_last_of_them_or_all_where_a_user_wants_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: bool
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    where = tmp_path / "mine" if named else home()
+    recorder = Recorder(Wish(where=where if named else None), print)
     for number in range(SUCCEEDED + 5):
         stream = Stream(Clock())
         recorder.record(stream, lambda: None)
@@ -165,8 +171,8 @@ def test_a_process_of_many_runs_keeps_the_last_of_them(recorder: Recorder, tmp_p
         end(stream)
         until(lambda stream=stream: not stream.is_read)
     recorder.close()
-    kept = {run.summary.tree for run in recorded(tmp_path)}
-    assert kept == {f"tree{number}" for number in range(5, SUCCEEDED + 5)}
+    kept = {run.summary.tree for run in recorded(where)}
+    assert kept == {f"tree{number}" for number in range(0 if named else 5, SUCCEEDED + 5)}
 
 
 def test_a_folder_that_cannot_be_made_is_said_once(tmp_path: Path, said: list[str]) -> None:
