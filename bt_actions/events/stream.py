@@ -9,8 +9,10 @@ any. Where nobody reads, nothing is made.
 from __future__ import annotations
 
 import threading
-from collections import deque
-from collections.abc import Callable
+from bisect import bisect, insort
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Any
 
 from py_trees.common import Status
@@ -22,8 +24,10 @@ from bt_actions.events.kinds import (
     FeedbackCame,
     Logged,
     Moment,
+    Node,
     NodeChanged,
     NodesAdded,
+    NodesRemoved,
     RoundBegan,
     RunBegan,
     StopWanted,
@@ -34,6 +38,8 @@ ROOM = 20_000
 """Events that wait for one reader, before what can be spared is left out for it."""
 SPARED = (FeedbackCame, VariableWritten, NodeChanged, RoundBegan, Logged)
 """Kinds that are left out for a slow reader; goals and the run itself never are."""
+CHANGES = 100
+"""Times that nodes come or go before what a late reader is told of them is put into one event."""
 JUMP = 0.5
 """Seconds by which a clock has to differ from the steady one at once to have jumped."""
 SLEW = 0.001
@@ -83,8 +89,8 @@ class Stream:
         self._lock = threading.Lock()
         self._readers: tuple[Reader, ...] = ()
         self._number = 0
-        self._nodes: tuple[Event, ...] = ()
-        """The RunBegan of the run that was told of last, and what was inserted since."""
+        self._nodes: tuple[RunBegan | NodesAdded | NodesRemoved, ...] = ()
+        """The RunBegan of the run that was told of last, and the nodes that came and went since."""
         self._last: tuple[float, float, float] | None = None
         self.stop_is_told = False
         """Whether it was told who asks the run to end; the run takes it back at its end."""
@@ -134,8 +140,10 @@ class Stream:
     def _give(self, event: Event) -> None:
         if isinstance(event, RunBegan):
             self._nodes = (event,)
-        elif isinstance(event, NodesAdded):
+        elif isinstance(event, NodesAdded | NodesRemoved):
             self._nodes += (event,)
+            if len(self._nodes) > CHANGES and isinstance(began := self._nodes[0], RunBegan):
+                self._nodes = (replace(began, nodes=_nodes_after(self._nodes)),)
         elif isinstance(event, StopWanted):
             self.stop_is_told = True
         for reader in self._readers:
@@ -156,3 +164,26 @@ class Stream:
         if ros < 0.0:
             jumps.append(("ros", ros))
         return jumps
+
+
+def _nodes_after(events: Iterable[RunBegan | NodesAdded | NodesRemoved]) -> tuple[Node, ...]:
+    """Return the nodes that are there in the end, by number, each with its index.
+
+    The index is a node's among those siblings that stand before it in what is returned.
+    """
+    nodes, below = dict[int, Node](), defaultdict[int | None, list[int]](list)
+    for event in events:
+        if isinstance(event, NodesRemoved):
+            for number in event.nodes:
+                below[nodes.pop(number).parent].remove(number)
+            continue
+        for node in event.nodes:
+            nodes[node.id], siblings = node, below[node.parent]
+            siblings.insert(len(siblings) if node.index is None else node.index, node.id)
+    index = dict[int, int]()
+    for siblings in below.values():
+        before = list[int]()
+        for number in siblings:
+            index[number] = bisect(before, number)
+            insort(before, number)
+    return tuple(replace(nodes[number], index=index[number]) for number in sorted(nodes))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import threading
 import time
 from typing import Any
@@ -14,11 +15,17 @@ from bt_actions.events import (
     EventsLost,
     FeedbackCame,
     GoalChanged,
+    Node,
     NodeChanged,
+    NodesAdded,
+    NodesRemoved,
     Paused,
+    RunBegan,
     RunEnded,
 )
-from bt_actions.events.stream import JUMP, Stream
+from bt_actions.events.stream import CHANGES, JUMP, Stream
+from bt_actions.story.state import State
+from tests.support.stories import state_of
 
 
 class Clock:
@@ -211,3 +218,27 @@ def test_a_ros_clock_that_goes_back_has_jumped_and_one_that_is_faster_has_not(
     goal(stream)
     jumps = [each for each in reader.take() if isinstance(each, ClockJumped)]
     assert [(each.clock, each.seconds) for each in jumps] == [("ros", -3.0)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_late_reader_is_told_of_the_nodes_that_are_there_in_few_events(
+    stream: Stream, seed: int
+) -> None:
+    chance, early = random.Random(seed), stream.reader()
+    root = Node(1, None, "root", "sequence", "")
+    stream.add(RunBegan, "ab" * 16, "tree", (root, Node(2, 1, "first", "wait", "")), {}, {}, {})
+    truth = State()
+    for number in range(3, 6 * CHANGES + seed):
+        for event in early.take():
+            truth.observe(event)
+        if len(leaves := truth.nodes[1].children) > CHANGES:
+            stream.add(NodesRemoved, (chance.choice(leaves),))
+        index = chance.randrange(len(leaves))
+        stream.add(NodesAdded, (Node(number, 1, str(number), "wait", "", index=index),))
+    for event in early.take():
+        truth.observe(event)
+    late = stream.reader().take()
+    told = state_of(late)
+    assert told.in_order() == truth.in_order()
+    assert [told.path(each) for each in told.nodes] == [truth.path(each) for each in truth.nodes]
+    assert len(late) <= CHANGES
