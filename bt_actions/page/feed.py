@@ -26,7 +26,8 @@ from bt_actions.events.wire import to_plain
 from bt_actions.recording.folders import is_written
 from bt_actions.recording.following import Follower
 from bt_actions.story.actions import GoalStory
-from bt_actions.story.state import Failure, State
+from bt_actions.story.failures import Failure
+from bt_actions.story.state import State
 
 MOST = 500
 """Events of one message."""

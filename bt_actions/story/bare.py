@@ -8,7 +8,8 @@ from typing import Any
 
 from bt_actions.events.bare import bare, bare_node, outcome_of, reason_of
 from bt_actions.events.kinds import Event, Moment, Node
-from bt_actions.story.state import State, Warned
+from bt_actions.story.failures import Warned
+from bt_actions.story.state import State
 
 _TEXTS = {"message": outcome_of, "warning": lambda text: ""}
 """Fields of a state's parts that may hold values, and what stays of each."""

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from bt_actions.story.actions import ActionStory
+from bt_actions.story.failures import Failure
 from bt_actions.story.state import NodeStory, State
 from bt_actions.story.values import feedback_text, round_text, unmet_text
 
@@ -71,6 +72,13 @@ def doing(state: State, story: NodeStory, now: float | None = None) -> Doing:
     does = goal_doing(action.state, action.server, action.attempt, action.of)
     since = _for(goal.since.steady, now)
     return does._replace(since=since, until=until, told=feedback_text(action))
+
+
+def did_text(stopped: Failure) -> str:
+    """Say what a node did that was stopped as the run was to end, and for how long."""
+    what = "in its tick" if stopped.in_tick else "running"
+    told = "" if stopped.in_tick or stopped.attempts else stopped.message
+    return str(Doing(what, since=_for(0.0, stopped.ran), told=told))
 
 
 def goal_doing(state: str, server: str, attempt: int, of: int) -> Doing:

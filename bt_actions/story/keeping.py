@@ -19,7 +19,8 @@ from typing import Any
 from bt_actions.events.kinds import Node, RunBegan
 from bt_actions.events.wire import WireError, packed, reader_of
 from bt_actions.story.actions import ActionStory, GoalStory
-from bt_actions.story.state import KEPT, Failure, NodeStory, State, Warned
+from bt_actions.story.failures import Failure, Warned
+from bt_actions.story.state import KEPT, NodeStory, State
 
 _SHARED = {each.__name__: each for each in (Node, GoalStory, ActionStory, Failure)}
 _OWN = (RunBegan, State, NodeStory, Warned)

@@ -36,7 +36,8 @@ from bt_actions.events.kinds import (
 from bt_actions.events.snapshot import Value
 from bt_actions.goals.policy import End
 from bt_actions.goals.unaccounted import GoalReport
-from bt_actions.story.actions import ActionStory, GoalStory
+from bt_actions.story.actions import ActionStory
+from bt_actions.story.failures import Failure, Warned
 from bt_actions.utilities.names import told_apart
 
 OVER = (Status.SUCCESS, Status.FAILURE)
@@ -72,46 +73,6 @@ class NodeStory:
     def is_leaf(self) -> bool:
         """Whether it has no children."""
         return not self.children
-
-
-@dataclass(slots=True)
-class Failure:
-    """One node that failed of itself."""
-
-    node: Node
-    at: Moment
-    holders: tuple[Node, ...]
-    """The nodes above it, upwards, as they stood then: each may be taken out later."""
-    message: str
-    items: tuple[tuple[Node, RoundBegan], ...] = ()
-    """The rounds of the loops that it failed in, the outermost first."""
-    action: ActionStory | None = None
-    """What the action did; None for a node that is no action."""
-    attempts: tuple[GoalStory, ...] = ()
-    """Of an action: the goals of the visit that failed."""
-    below: tuple[Failure, ...] = ()
-    """What the node has stopped, where its time was over, or its guard did not hold."""
-    by: Node | None = None
-    """The node that went on in spite of it; None while it is passed on upwards."""
-
-    @property
-    def path(self) -> tuple[str, ...]:
-        """The names from the root down to the node."""
-        return (*(above.name for above in reversed(self.holders)), self.node.name)
-
-    @property
-    def place(self) -> str:
-        """file:line:column, or ""."""
-        return self.node.place
-
-
-@dataclass(frozen=True, slots=True)
-class Warned:
-    """A leaf that succeeded in something that may not be what was meant."""
-
-    node: Node
-    path: tuple[str, ...]
-    message: str
 
 
 @dataclass(slots=True, eq=False)
@@ -179,6 +140,11 @@ class State:
                 self.servers[event.server] = event
             case TickLasts():
                 self.lasting = None if event.is_over else event
+                for each in self.stopped:
+                    if each.in_tick and each.node.id == event.node:
+                        each.ran = event.seconds
+                if self.stop is not None and not event.is_over:
+                    self._stop(event.at.steady)
             case NodesAdded():
                 self._add(event.nodes)
             case NodesRemoved():
@@ -199,7 +165,7 @@ class State:
             case StopWanted():
                 if self.stop is None:
                     self.stop = event
-                    self.stopped = [self._failure(each, each.message) for each in self.running]
+                    self._stop(event.at.steady)
                 self.abandoned |= event.abandons
             case Paused():
                 self.paused = event.paused
@@ -261,6 +227,17 @@ class State:
         if event.node in self._actions:
             self._actions[event.node].failed += 1
         story.pending = passed or [self._failure(story, event.message)]
+
+    def _stop(self, now: float) -> None:
+        """Take note of what runs, as the run is to end."""
+        lasting = self.lasting
+        self.stopped = [self._failure(each, each.message) for each in self.running]
+        for failure, story in zip(self.stopped, self.running, strict=True):
+            if lasting is not None and lasting.node == story.node.id:
+                failure.in_tick = True
+                failure.ran = now - lasting.at.steady + lasting.seconds
+            else:
+                failure.ran = now - story.since.steady if story.since is not None else 0.0
 
     def _failure(self, story: NodeStory, message: str) -> Failure:
         number = story.node.id

@@ -16,8 +16,9 @@ from bt_actions.events.kinds import Node, RoundBegan
 from bt_actions.events.snapshot import HIDDEN
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory, GoalStory
-from bt_actions.story.doing import doing
-from bt_actions.story.state import Failure, State
+from bt_actions.story.doing import did_text, doing
+from bt_actions.story.failures import Failure
+from bt_actions.story.state import State
 from bt_actions.story.values import LONG, opened, round_text, unmet_text
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import brief, fit, shorten
@@ -106,7 +107,10 @@ def _told(failure: Failure, state: State) -> Iterator[str]:
     """Yield when, where and in which item it failed; each attempt; who passed it on."""
     items = _items(failure.items)
     yield clean(f"{_clock(failure.at.wall)}  {' / '.join(failure.path)}{items}")
-    yield from _attempts(failure)
+    if failure.ran is not None:
+        yield clean(f"  {did_text(failure)}")
+    if failure.ran is None or failure.attempts:
+        yield from _attempts(failure)
     for each in failure.below:
         said = each.message
         if each.action is not None and each.attempts:

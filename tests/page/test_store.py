@@ -27,7 +27,8 @@ from bt_actions.events import (
 from bt_actions.events.wire import to_plain
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.page.feed import known
-from bt_actions.story.state import Failure, State
+from bt_actions.story.failures import Failure
+from bt_actions.story.state import State
 from tests.page.conftest import Served
 from tests.support import browser as chromium
 from tests.support.every_kind import RUN_ID, every_kind

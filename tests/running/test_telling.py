@@ -493,7 +493,9 @@ class TestWhatIsOdd:
         said = why(runner.state)
         assert said[0] == "stopped while it ran:"
         assert said[1].endswith("  root / m")
-        assert "goal {distance: 7.0}" in said[2]
+        assert said[2] == "  running for 2.0 s"
+        assert said[3].startswith("  CANCELED: ")
+        assert "goal {distance: 7.0}" in said[3]
 
 
 class TestStops:

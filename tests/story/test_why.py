@@ -11,6 +11,7 @@ from robot_control_interfaces.action import MoveRobot as Move
 from bt_actions import MoveRobot, Retry, Timeouts, load_tree
 from bt_actions.behaviours.decorators import Deadline
 from bt_actions.behaviours.leaves import Wait
+from bt_actions.events import Event, StopWanted
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.doing import doing
 from bt_actions.story.state import State
@@ -135,6 +136,41 @@ def test_what_runs_in_a_loop_tells_its_item() -> None:
     state = story.told(*begins, story.node(each, Status.RUNNING))
     told = "Rest, item 2 of 3 of Each station (3.0): running for 2.5 s"
     assert why(state, story.time + 2.0) == [told]
+
+
+def stopping(story: Story) -> StopWanted:
+    return StopWanted(story._next(), "SIGINT", "interrupted by SIGINT")
+
+
+def test_what_a_stop_ended_has_not_failed_and_tells_how_long_it_ran() -> None:
+    leaf = FakeNode("Forever", kind="Running", place="x.yaml:3:3")
+    story = Story(FakeNode("Both", [leaf]))
+    runs = [story.node(each, Status.RUNNING, "running") for each in (leaf, story.root)]
+    story.time += 2.0
+    events = [*runs, stopping(story)]
+    events += [story.node(each, Status.INVALID) for each in (leaf, story.root)]
+    said = lines(story.told(*events, story.finish(Status.INVALID)))
+    assert said == [
+        "stopped while it ran:",
+        "Both / Forever",
+        "  running for 3.0 s: running",
+        "  x.yaml:3:3",
+    ]
+
+
+@pytest.mark.parametrize("is_told", ["before", "after"])
+def test_a_leaf_in_whose_tick_a_stop_found_the_run_says_so_whenever_that_was_told(
+    is_told: str,
+) -> None:
+    grasp = FakeNode("Grasp", kind="python", place="x.yaml:3:3")
+    story = Story(FakeNode("Work", [FakeNode("Inner", [grasp])]))
+    events: list[Event] = [story.node(story.root, Status.RUNNING)]
+    makers = [lambda: story.lasts(grasp, 1.0), lambda: stopping(story)]
+    events += [make() for make in (makers if is_told == "before" else reversed(makers))]
+    events.append(story.lasts(grasp, 4.0, is_over=True))
+    events += [story.node(grasp, Status.SUCCESS), story.node(story.root, Status.INVALID)]
+    said = lines(story.told(*events, story.finish(Status.INVALID)))
+    assert said[1:] == ["Work / Inner / Grasp", "  in its tick for 4.0 s", "  x.yaml:3:3"]
 
 
 def test_between_two_attempts_a_leaf_tells_when_the_next_begins_and_why() -> None:

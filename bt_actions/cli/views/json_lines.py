@@ -26,7 +26,8 @@ from bt_actions.events import (
 )
 from bt_actions.events.kinds import FeedbackCame
 from bt_actions.story.actions import ActionStory
-from bt_actions.story.state import Failure, State
+from bt_actions.story.failures import Failure
+from bt_actions.story.state import State
 from bt_actions.story.why import why
 from bt_actions.story.words import stopping_text
 from bt_actions.utilities.plain_text import as_json

@@ -72,11 +72,14 @@ const FOLD = {
   RoundBegan(s, e) { if (e.n !== undefined) s.round.set(e.n, e); },
   VariableWritten(s, e) { s.vars.set(e.name, e); },
   ServerSeen(s, e) { s.up.set(e.server, { up: e.in_sight, t: e.t }); },
-  TickLasts(s, e) { s.lasting = e.is_over || e.n === undefined ? null : { n: e.n, from: e.t - e.seconds }; },
+  TickLasts(s, e, nodes) {
+    s.lasting = e.is_over || e.n === undefined ? null : { n: e.n, from: e.t - e.seconds };
+    if (s.stop && s.lasting) stop(s, e, nodes);
+  },
   NodesAdded(s, e, nodes) { s.room(nodes.length); },
   NodesRemoved(s, e) { for (const n of e.slots) { s.status[n] = "idle"; s.running.delete(n); s.pending.delete(n); s.due.delete(n); } },
   RunBegan(s, e, nodes) { s.room(nodes.length); for (const given of e.given || []) s.vars.set(given.name, given); },
-  StopWanted(s, e, nodes) { if (!s.stop) { s.stop = e; s.stopped = leaves(s, nodes).map((n) => failure(s, n, e, s.message[n])); } },
+  StopWanted(s, e, nodes) { if (!s.stop) { s.stop = e; stop(s, e, nodes); } },
   Paused(s, e) { s.paused = e.paused; },
   EventsLost(s, e) { s.lost += e.count; },
   TreeFinished(s, e) { s.finished = e; },
@@ -94,6 +97,9 @@ const FOLD = {
 };
 
 const failure = (s, n, e, message) => ({ n, t: e.t, number: e.at[0], message, by: null, attempt: s.attempt.get(n) });
+
+// What runs, as the run is to end.
+function stop(s, e, nodes) { s.stopped = leaves(s, nodes).map((n) => failure(s, n, e, s.message[n])); }
 
 function failed(s, n, e, nodes) {
   const passed = [];
