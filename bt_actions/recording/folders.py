@@ -111,7 +111,7 @@ def parts_of(first: Path) -> list[Path]:
     numbered = re.compile(rf"{re.escape(first.stem)}\.(\d+)\.mcap")
     found = [
         (int(match[1]), each)
-        for each in first.parent.glob(f"{first.stem}.*.mcap")
+        for each in first.parent.glob("*.mcap")
         if (match := numbered.fullmatch(each.name))
     ]
     return [*([first] if first.exists() else []), *(each for _, each in sorted(found))]

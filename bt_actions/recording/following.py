@@ -1,7 +1,7 @@
 """Follows a run while it is written: what has come since the last look, whole records only.
 
-A file that is finished meanwhile is another file under the same name. The place of a follower is
-the number of the latest event, which both have.
+A file that is finished meanwhile is another file under the same name, which is read from its
+beginning: the recording knows the number of the latest event.
 """
 
 from __future__ import annotations
@@ -12,11 +12,9 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
-from bt_actions.events import EventsLost
-from bt_actions.recording.folders import held, parts_of
+from bt_actions.recording.folders import held, is_written, parts_of
 from bt_actions.recording.mcap_records import MAGIC, whole_length
 from bt_actions.recording.reading import Item, Recording
-from bt_actions.story.state import State
 
 
 class Follower:
@@ -31,7 +29,6 @@ class Follower:
         self._part, self._inode = first, 0
         self._at = 0
         """Bytes of the present file that were read."""
-        self._number = 0
 
     def look(self) -> list[Item]:
         """Return what has come since the last look: events, and a state where some are missing.
@@ -43,9 +40,12 @@ class Follower:
     def news(self) -> Iterator[Item]:
         """Yield the same, for a reader who takes all of it: one file at most is held in memory."""
         while True:
-            yield from self._more()
-            parts = parts_of(self.recording.first)
-            later = [each for each in parts if parts.index(each) > self._place(parts)]
+            first = self.recording.first
+            parts = parts_of(
+                first
+            )  # before the reading: a file is whole once the next one is there
+            later = parts[self._place(parts) + 1 :]
+            yield from self._more(is_whole=bool(later) or not is_written(first))
             if not later:
                 return
             self._turn_to(later[0])
@@ -67,7 +67,7 @@ class Follower:
     def _turn_to(self, part: Path) -> None:
         self._part, self._at, self._inode = part, 0, 0
 
-    def _more(self) -> Iterator[Item]:
+    def _more(self, *, is_whole: bool) -> Iterator[Item]:
         try:
             file = self._part.open("rb")
         except FileNotFoundError:  # the oldest of a long run are removed
@@ -79,18 +79,9 @@ class Follower:
                 self.recording.begin_part()
             file.seek(self._at)
             data = file.read()
-        length = whole_length(data)
+        length = len(data) if is_whole else whole_length(data)
         if not length:
             return
         head = b"" if self._at == 0 else MAGIC
         self._at += length
-        items = self.recording.items_in(io.BytesIO(head + data[:length]))
-        yield from (item for item in items if self._is_new(item))
-
-    def _is_new(self, item: Item) -> bool:
-        at = item.now if isinstance(item, State) else item.at
-        if at is None or at.number <= self._number:
-            return False
-        if not isinstance(item, EventsLost):  # which has the number of what follows
-            self._number = at.number
-        return True
+        yield from self.recording.items_in(io.BytesIO(head + data[:length]))

@@ -102,10 +102,13 @@ def message_record(
 
 
 def whole_length(data: bytes) -> int:
-    """Return how many bytes of what was read of a file so far are whole records."""
+    """Return how many bytes of what was read of a file so far are records, whole or damaged."""
     at = len(MAGIC) if data.startswith(MAGIC) else 0
     while at + _HEAD.size <= len(data):
-        end = at + _HEAD.size + _HEAD.unpack_from(data, at)[1]
+        _, length = _HEAD.unpack_from(data, at)
+        if length > LONGEST:  # which no more data will make whole
+            return len(data)
+        end = at + _HEAD.size + length
         if end > len(data):
             break
         at = end

@@ -90,6 +90,8 @@ class Recording:
         """For how many seconds the tick lasted then."""
         self._number = 0
         """Of the latest event."""
+        self._before = self._known = 0
+        """That of the event before it, and the latest at the beginning of the present file."""
         self._base: int | None = None
         """Nanoseconds by which the log's time is ahead of the steady clock."""
         self._names: set[str] = set()
@@ -130,6 +132,7 @@ class Recording:
     def begin_part(self) -> None:
         """Take note that what is read next is another file, with numbers of its own for topics."""
         self._layouts, self._schemas = dict(_BY_NUMBER), dict[int, str]()
+        self._known = self._number
 
     def items_in(self, file: BinaryIO) -> Iterator[Item]:
         """Yield what is in a file, or in more of it; raises NoMcap, OSError, RecordingError."""
@@ -167,7 +170,7 @@ class Recording:
         """The event or the state that a message holds, unless it is known."""
         try:
             head, texts = decode(layout, message.data)
-            if layout is _HEARTBEAT:
+            if layout is _HEARTBEAT and self._base is not None:
                 self.last_beat, self.tick = message.log_time * 1e-9, float(head[-1])  # type: ignore[arg-type]
             elif layout is _TRANSITION:
                 yield from self._transition(message, head)
@@ -175,6 +178,8 @@ class Recording:
                 yield from self._event(texts[1], message.log_time, _hex(head[0]))
             elif layout is _STATE and self._is_meant(head[0]):
                 yield from self._state(texts[1], message.log_time)
+            elif layout is _STATE:
+                self._base = None  # of another run, as what follows is
         except (BadMessage, WireError, TypeError, ValueError):
             self.damaged += 1
 
@@ -186,7 +191,10 @@ class Recording:
             return
         event = from_line(text)
         self._base = log_time - nanoseconds(event.at.steady)
-        self._number = event.at.number
+        if not self._goes_on(event.at.number):
+            return
+        if isinstance(event, EventsLost):  # which has the number of the event behind it
+            self._number = self._before
         if isinstance(event, RunBegan):
             self._node = 0
         if isinstance(event, RunBegan | NodesAdded):
@@ -195,6 +203,19 @@ class Recording:
             self._run_id = event.run_id if event.run_id == run_id else ""
             event = replace(event, sources=dict(self.sources))
         yield event
+
+    def _goes_on(self, number: int) -> bool:
+        """Take note of the number of an event unless it goes back.
+
+        One that is damaged and far ahead costs none of those behind it.
+        """
+        if number > self._number:
+            self._before = self._number
+        elif not self._before < number < self._number:
+            self.damaged += number > self._known  # else it is read anew
+            return False
+        self._number = number
+        return True
 
     def _number_nodes(self, nodes: tuple[Node, ...]) -> None:
         """Refuse nodes that are no tree: numbers grow, and parents come before their children."""
@@ -210,7 +231,8 @@ class Recording:
         number, seconds, rest, node, status, by_itself = head
         if self._base is None or number == self._number or not isinstance(number, int):
             return  # the event before says more of the same
-        self._number = number
+        if not self._goes_on(number):
+            return
         steady = (message.log_time - self._base) / 10**9
         ros = (int(seconds) * 10**9 + int(rest)) / 10**9  # type: ignore[call-overload]
         at = Moment(number, steady, message.publish_time / 10**9, ros)
@@ -219,11 +241,12 @@ class Recording:
 
     def _state(self, text: str, log_time: int) -> Iterator[Item]:
         state = from_json(text)
-        if state.now is None or state.now.number <= self._number:
+        if state.now is None:
             return
-        lost = state.now.number - self._number
-        self._number, self._node = state.now.number, max(state.nodes)
         self._base = log_time - nanoseconds(state.now.steady)
+        if not self._goes_on(state.now.number):
+            return
+        lost, self._node = self._number - self._before, max(state.nodes)
         self._run_id = state.began.run_id if state.began is not None else ""
         yield EventsLost(state.now, lost)
         yield state

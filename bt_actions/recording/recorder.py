@@ -95,8 +95,8 @@ class Recorder:
         if run.first is not None:
             with contextlib.suppress(OSError):
                 finish_beside(run.first, may_wait=not self._runs)
-        if self._wish.first is None:
-            prune(self._wish.where)
+        if self._wish.first is None and self._wish.where is None:  # else it is kept for good
+            prune()
 
     def _tell(self, text: str) -> None:
         with contextlib.suppress(Exception):  # a log that is closed

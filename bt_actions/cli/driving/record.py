@@ -61,5 +61,8 @@ def _refuse(path: Path) -> None:
         raise BadInput(f"--record {path}: the name of a recording ends in .mcap")
     if not path.parent.is_dir():
         raise BadInput(f"--record {path}: there is no folder {path.parent}")
-    if path.exists():
-        raise BadInput(f"--record {path}: the file exists, and a recording replaces none")
+    from bt_actions.recording.folders import parts_of, summary_of
+
+    taken = [each for each in (*parts_of(path), path, summary_of(path)) if os.path.lexists(each)]
+    if taken:
+        raise BadInput(f"--record {path}: {taken[0]} exists, and a recording replaces no file")
