@@ -75,6 +75,13 @@ def rosout(node: Any) -> Rosout:
     return Rosout(node)
 
 
+def where(node: Any) -> dict[str, str]:
+    """Return the full name of a node, its domain, and the name of this computer."""
+    from bt_actions.ros.naming import where
+
+    return where(node)
+
+
 def declare_input(node: Any, *given: Any) -> bool:
     """Show an input as a parameter of a node; see ros/parameters.py."""
     from bt_actions.ros.parameters import declare_input

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import os
 import signal
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -78,6 +79,18 @@ class TestRun:
         with TreeRunner(leaf, namespace=namespace) as runner:
             assert runner.run(timeout=9.0) is Status.SUCCESS
         assert journal.ends() == ["succeeded"]
+
+    def test_in_a_place_that_is_told(self, node: Any) -> None:
+        with TreeRunner(py_trees.behaviours.Success("s"), node=node) as runner:
+            begun: list[Event] = []
+            runner.observe(begun.append)
+            runner.run(timeout=9.0)
+        assert isinstance(begun[0], RunBegan)
+        assert begun[0].where == {
+            "node": node.get_fully_qualified_name(),
+            "domain": str(node.context.get_domain_id()),
+            "host": socket.gethostname(),
+        }
 
     def test_again_and_again(self, journal: Journal, name: str, node: Any) -> None:
         leaf = MoveRobot("m", 0.05, action_name=name)

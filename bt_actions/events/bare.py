@@ -37,6 +37,8 @@ _VALUE = re.compile(r"\{|: |; ")
 """What may stand before a value: an action's `explain` follows a semicolon."""
 _SETTINGS = ("timeouts", "attempts", "memory", "constants")
 """Of a node: those that are no values of the robot's."""
+_WHERE = ("node", "domain", "simulation")
+"""Of a run: where it is, but for the name of the computer."""
 
 
 def bare(event: Event) -> Event | None:
@@ -82,7 +84,11 @@ def _finished(event: TreeFinished) -> TreeFinished:
 
 _STRIPPED: dict[type[Event], Callable[[Any], Event | None]] = {
     RunBegan: lambda event: replace(
-        event, nodes=tuple(map(bare_node, event.nodes)), inputs=_hidden(event.inputs), sources={}
+        event,
+        nodes=tuple(map(bare_node, event.nodes)),
+        inputs=_hidden(event.inputs),
+        sources={},
+        where={name: each for name, each in event.where.items() if name in _WHERE},
     ),
     NodesAdded: lambda event: replace(event, nodes=tuple(map(bare_node, event.nodes))),
     NodeChanged: lambda event: replace(event, message=outcome_of(event.message), warning=""),

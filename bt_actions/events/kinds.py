@@ -78,6 +78,10 @@ class RunBegan(Event):
     """The UUID of the RunTree goal that the run answers, in hexadecimal; or ""."""
     caller: str = ""
     """The `run_id` of the run whose leaf sent that goal, where it is known."""
+    where: Mapping[str, str] = field(default_factory=dict)
+    """`node` (its full name), `domain` and `host`; of a run in a simulation also `simulation`: the
+    options that say what stood in for the world (``--sim --speed 10 --fault move_robot:1:abort``).
+    """
 
 
 @dataclass(frozen=True, slots=True)

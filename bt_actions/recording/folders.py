@@ -15,8 +15,8 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +48,8 @@ class Summary:
     """Seconds since 1970."""
     request: str = ""
     """The UUID of the RunTree goal that it answers, or ""."""
+    where: Mapping[str, str] = field(default_factory=dict)
+    """As RunBegan has it: node, domain, host, simulation."""
     status: str = ""
     """SUCCESS, FAILURE or INVALID; "" while it goes on, and where its process was killed."""
     stopped_by: str = ""
@@ -61,6 +63,11 @@ class Summary:
     def failed(self) -> bool:
         """Whether it failed, was out of time, or never finished."""
         return self.status != "SUCCESS" and self.stopped_by in ("", "TIMEOUT")
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether a simulation stood in for the world."""
+        return "simulation" in self.where
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,12 +148,14 @@ def read_summary(first: Path) -> Summary | None:
             name: clean(str(data.get(name) or ""))
             for name in ("run_id", "tree", "request", "status", "stopped_by", "cause")
         }
+        where = {clean(name): clean(str(each)) for name, each in data.get("where", {}).items()}
         code, seconds = data.get("exit_code"), data.get("seconds")
         began = float(data["began"])
         time.localtime(began)  # raises where no clock can show that
         return Summary(
             **text,
             began=began,
+            where=where,
             exit_code=None if code is None else int(code),
             seconds=None if seconds is None else float(seconds),
         )

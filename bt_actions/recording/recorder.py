@@ -19,6 +19,7 @@ from pathlib import Path
 from py_trees.common import Status
 
 from bt_actions.events import Event, RunBegan, RunEnded
+from bt_actions.events.bare import bare
 from bt_actions.events.stream import Reader, Stream
 from bt_actions.recording.finishing import finish_beside
 from bt_actions.recording.folders import (
@@ -177,7 +178,7 @@ class _Run:
                 made.callback(first.unlink)
                 made.callback(writer.close)
                 self._locks.enter_context(held(first, alone=True, waits=True))
-                write_summary(first, _summary(began))
+                write_summary(first, begun(began, values=wish.values))
                 made.pop_all()
         except OSError as error:
             remedy = "set XDG_STATE_HOME to a folder that can be written, or say --no-record"
@@ -201,8 +202,11 @@ class _Run:
                         write_summary(self.first, summary(self._writer.state))
 
 
-def _summary(began: RunBegan) -> Summary:
-    return Summary(began.run_id, began.tree, began.at.wall, began.request)
+def begun(began: RunBegan, *, values: bool = True) -> Summary:
+    """Return what a list says of a run that has just begun."""
+    kept = began if values else bare(began)
+    assert isinstance(kept, RunBegan)
+    return Summary(kept.run_id, kept.tree, kept.at.wall, kept.request, dict(kept.where))
 
 
 def summary(state: State) -> Summary:
@@ -215,6 +219,7 @@ def summary(state: State) -> Summary:
         began.tree,
         began.at.wall,
         began.request,
+        dict(began.where),
         status=state.status.value if over else "",
         stopped_by=state.stop.who if state.stop is not None else "",
         exit_code=ended.exit_code if ended is not None else None,

@@ -28,6 +28,7 @@ LEVELS = 8
 """Runs that are told of at most, each below a leaf of the one before."""
 TICK = 0.1
 """Seconds from which on a tick is told to have lasted when its process was killed."""
+_PLACE = ("node", "domain", "host")
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,6 +208,10 @@ def _head(report: Report) -> Iterator[str]:
     yield f"run {began.run_id}"
     when = time.strftime("%A %d %B %Y %H:%M:%S %z", time.localtime(began.at.wall))
     yield f"began {when}"
+    if state.simulation:
+        yield f"in a simulation: {state.simulation}"
+    if place := [f"{key} {began.where[key]}" for key in _PLACE if key in began.where]:
+        yield ", ".join(place)
     if began.caller or began.request:
         yield _asked_by(report)
     if began.inputs:

@@ -10,6 +10,7 @@ import contextlib
 import itertools
 import os
 import re
+import socket
 import sys
 import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
@@ -34,6 +35,13 @@ def overrides(node: Node) -> dict[str, Parameter]:
     """Return the parameters that ROS arguments give a node, by name."""
     with node.handle:
         return dict(node.handle.get_parameters(Parameter))
+
+
+def where(node: Node) -> dict[str, str]:
+    """Return the full name of a node, its domain, and the name of this computer."""
+    domain = node.context.get_domain_id()
+    name = node.get_fully_qualified_name()
+    return {"node": name, "domain": str(domain), "host": socket.gethostname()}
 
 
 def node_name(tree: str) -> str:

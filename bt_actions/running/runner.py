@@ -109,6 +109,7 @@ class TreeRunner:
             misbehaved=self._spinner.taken_away,
         )
         self._loop.teller.asked_by = asked_by
+        self._loop.teller.where = wiring.where(self.node)
         # Before the exit hook of ros/exit.py: a tree that ticks on would send another goal,
         # and a daemon thread in spin() aborts the process that ends beside it.
         atexit.register(self._at_exit)
@@ -127,6 +128,11 @@ class TreeRunner:
     def unaccounted(self) -> list[GoalReport]:
         """The goals of this tree whose end is UNKNOWN, by now."""
         return self._loop.goals.unaccounted
+
+    @property
+    def where(self) -> dict[str, str]:
+        """Where the runs are, as `RunBegan` tells; may be added to before a run."""
+        return self._loop.teller.where
 
     @property
     def stream(self) -> Stream:

@@ -54,6 +54,8 @@ class TreeTeller(Teller):
         """The latest messages of nodes that had read a secret: their parents may take them over."""
         self.asked_by = "", ""
         """The id of the RunTree goal that the runs answer, and that of its caller's run."""
+        self.where: dict[str, str] = {}
+        """Where the runs are, as RunBegan tells."""
         super().__init__(Stream(self._moment), self._host.steady)
 
     def _moment(self) -> tuple[float, float, float]:
@@ -101,6 +103,7 @@ class TreeTeller(Teller):
             document.sources_of(root),
             _versions(),
             *self.asked_by,
+            dict(self.where),
         )
 
     def added(self) -> None:

@@ -113,6 +113,11 @@ class State:
     """Of all nodes, also those that are in the tree no more."""
     _called: dict[int, str] = field(default_factory=dict)
 
+    @property
+    def simulation(self) -> str:
+        """What stood in for the world, as options of the command line; "" of a run in the world."""
+        return self.began.where.get("simulation", "") if self.began is not None else ""
+
     # Taking in
 
     def observe(self, event: Event) -> None:

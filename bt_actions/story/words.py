@@ -90,7 +90,7 @@ def left_open(state: State) -> list[str]:
     ended = state.ended or _NOTHING
     lines = [line for line in (ended.complaint, error_text(state)) if line]
     left = {each.server for each in state.actions if each.left_at_server or each.live}
-    if left and not ended.world:  # of a simulation, which ends with us
+    if left and not state.simulation:  # which ended with the run's process
         which = " ".join(["", *sorted(left)]) if len(left) <= MOST else ""
         lines.append(
             "A goal may still run, or run on where its server only stood still: once that is in "

@@ -107,6 +107,23 @@ def test_inputs_that_differ_are_told_first(
     assert lines_of(capsys)[2:-1] == told
 
 
+def test_where_the_runs_were_is_told_where_it_differs(
+    recorded: Recorded, capsys: pytest.CaptureFixture[str]
+) -> None:
+    night = run_of(NIGHT)
+    a = {"node": "/night", "host": "robot7", "simulation": "--sim --speed 10"}
+    b = {"node": "/night", "host": "robot8"}
+    runs = [
+        recorded(changed(night, where=a, run_id="a" * 32)),
+        recorded(changed(night, where=b)),
+    ]
+    assert main(["diff", *runs]) == 0
+    assert lines_of(capsys)[2:-1] == [
+        "host: A robot7 | B robot8",
+        "simulation: A --sim --speed 10 | B none",
+    ]
+
+
 @pytest.mark.parametrize(
     ("a", "b", "told"),
     [

@@ -104,6 +104,19 @@ class TestRuns:
         assert data[2]["cause"] == "Move: ABORTED: a fault"
         assert data[2]["path"] == str(four["failed"])
 
+    def test_in_a_simulation_are_marked(self, capsys: Out) -> None:
+        where = {"host": "robot7", "simulation": "--sim --speed 1"}
+        for number in (1, 2):
+            story, leaf = story_of("patrol", number)
+            story.began = replace(story.began, where=where if number == 2 else {})
+            record([story.began, *story.succeed(leaf), story.finish(Status.SUCCESS)])
+        main(["runs"])
+        rows = columns_of(capsys.readouterr().out)
+        assert [row[4:-1] for row in rows] == [["SUCCESS", "in", "sim"], ["SUCCESS"]]
+        main(["runs", "--json"])
+        data = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+        assert [each["where"] for each in data] == [where, {}]
+
     def test_fit_into_a_narrow_terminal(
         self, four: dict[str, Path], capsys: Out, monkeypatch: pytest.MonkeyPatch
     ) -> None:
@@ -215,6 +228,7 @@ class TestReport:
         assert text.startswith("# `deliver: FAILURE after 3.00 s`\n")
         (data,) = json.loads((tmp_path / "x.json").read_text())["runs"]
         assert data["status"] == "FAILURE"
+        assert data["where"] == {}
         assert "Move: ABORTED: a fault" in text
         assert data["timeline"][-2]["text"] in text
         for line in data["why"]:
@@ -295,12 +309,13 @@ def test_a_process_that_is_killed_leaves_what_it_was_doing(start: Start, capsys:
     process.popen.kill()
     process.popen.wait()
     main(["runs"])
-    assert "never finished" in capsys.readouterr().out
+    assert "never finished in sim" in capsys.readouterr().out
     out = reported()
     assert out.startswith("pick_and_place: never finished\n")
     assert "  its process lived until " in out
     assert waits in out
-    assert "`bt-actions cleanup /move_robot` cancels it." in out
+    assert "  in a simulation: --sim --speed 0.2\n" in out
+    assert "cleanup" not in out
     (first,) = recordings()
     assert is_finished(first)
 

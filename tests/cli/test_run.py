@@ -128,10 +128,13 @@ class TestExitCode0:
     ) -> None:
         monkeypatch.setenv("RCUTILS_LOGGING_USE_STDOUT", "1")
         faulty = ("--fault", "move_robot:1:reject", "--sim", "--speed", "20", "--json")
-        run = start("run", "pick_and_place", *faulty)
+        chance = ("--fault", "gripper_control:1%:slow=1", "--seed", "3")
+        run = start("run", "pick_and_place", *faulty, *chance)
         assert run.wait() == 0, run
         objects: list[dict[str, Any]] = [json.loads(line) for line in run.lines]
         assert objects[0]["event"] == "started"
+        said = " ".join((*faulty[2:5], *faulty[:2], *chance))
+        assert objects[0]["where"]["simulation"] == said
         last = objects[-1]
         assert (last["event"], last["status"], last["exit_code"]) == ("finished", "SUCCESS", 0)
         assert last["outputs"]["final_pose"] == pytest.approx(5.0, abs=0.01)

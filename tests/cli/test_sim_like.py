@@ -66,6 +66,10 @@ def test_a_night_fails_again_as_it_did(start: Start, tmp_path: Path) -> None:
     again = start("run", NIGHT, "--sim-like", str(first), "--speed", "10", "--record", str(second))
     assert again.wait(60.0) == 1, again
     assert outcomes(Recording(second).items()) == was
+    runs = [Recording(each).state() for each in (first, second)]
+    assert runs[0].simulation == "--sim --speed 10 --fault move_robot:12:abort"
+    assert runs[0].began is not None
+    assert runs[1].simulation == f"--sim-like {runs[0].began.run_id} --speed 10"
     assert any("13 of 13 of /gripper_control, 12 of 12 of" in line for line in again.lines), again
     assert any("feedback is played as it was recorded" in line for line in again.errors), again
 

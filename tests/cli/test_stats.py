@@ -55,7 +55,7 @@ def test_each_action_is_told_with_its_outcomes_and_the_seconds_of_each_phase(
 def test_the_same_is_told_as_one_object(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["stats", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["runs"] == 2
+    assert (told["runs"], told["left_out"]) == (2, 0)
     grip, move = told["actions"]
     assert (grip["server"], grip["type"]) == ("/gripper_control", "Gripper")
     seconds = move.pop("seconds")
@@ -82,6 +82,25 @@ def test_runs_of_one_tree_are_counted_alone(
     assert json.loads(capsys.readouterr().out)["runs"] == 1
     assert main(["stats", "--tree", "nigth"]) == 2
     assert "did you mean 'night'?" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("files")
+def test_runs_in_a_simulation_are_counted_for_themselves_and_else_left_out(
+    nights: list[list[Event]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    where = {"simulation": "--sim --speed 10 --fault move_robot:12:abort"}
+    record(changed(nights[1], where=where, run_id="a" * 32))
+    heads = []
+    for words in (["stats"], ["stats", "--simulated"]):
+        assert main(words) == 0
+        heads.append(capsys.readouterr().out.splitlines()[0])
+    assert heads == [
+        "2 runs; 1 in a simulation left out (--simulated counts these alone)",
+        "1 run; 2 in the world left out",
+    ]
+    assert main(["stats", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["runs"], told["left_out"]) == (2, 1)
 
 
 def test_a_damaged_file_is_named_and_passed_over(

@@ -522,6 +522,7 @@ def test_json_names_the_tree_as_its_file_does_and_its_nodes(tmp_path: Path) -> N
         "tree": "errand",
         "run": began.run_id,
         "wall": began.at.wall,
+        "where": {},
         "inputs": {"n": 2},
         "nodes": [
             {"id": 1, "parent": None, "name": "Not", "kind": "invert", "place": f"{path}:3:8"},

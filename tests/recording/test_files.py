@@ -208,8 +208,10 @@ def test_without_values_none_is_in_the_file(tmp_path: Path) -> None:
         b"tree: all",
         b"said",
         b"1.00 m",
+        b"robot7",
     ):
         assert value not in data.replace(b"\\u0000", b"")
+    assert b"--sim --speed 2" in data
     assert told(read(tmp_path / "run.mcap")) == told([e for e in map(bare, events) if e])
 
 

@@ -29,7 +29,7 @@ from bt_actions.recording.finishing import is_finished
 from bt_actions.recording.folders import SUCCEEDED, home, is_written, read_summary, recorded
 from bt_actions.recording.reading import Recording
 from bt_actions.recording.recorder import BEAT, Recorder, Wish
-from tests.support.every_kind import NODES, RUN_ID
+from tests.support.every_kind import NODES, RUN_ID, WHERE
 from tests.support.waiting import until
 
 ROOT = Path(__file__).parents[2]
@@ -46,8 +46,8 @@ class Clock:
         return time.monotonic(), time.time() + self.set_by, 1.0
 
 
-def begin(stream: Stream, run_id: str = RUN_ID, tree: str = "tree") -> None:
-    stream.add(RunBegan, run_id, tree, NODES, {}, {}, {})
+def begin(stream: Stream, run_id: str = RUN_ID, tree: str = "tree", **more: object) -> None:
+    stream.add(RunBegan, run_id, tree, NODES, {}, {}, {}, **more)
 
 
 def end(stream: Stream, status: Status = Status.SUCCESS, code: int = 0) -> None:
@@ -77,6 +77,21 @@ def test_a_run_is_in_its_folder_from_its_first_event_on(recorder: Recorder, tmp_
     assert run.is_written
     assert run.first.parent.stat().st_mode & 0o777 == 0o700
     assert (run.summary.tree, run.summary.status, run.summary.failed) == ("tree", "", True)
+
+
+@pytest.mark.parametrize("values", [True, False])
+def test_the_list_says_from_its_beginning_where_a_run_is_and_names_no_computer_without_values(
+    tmp_path: Path, *, values: bool
+) -> None:
+    stream, recorder = Stream(Clock()), Recorder(Wish(where=tmp_path, values=values), print)
+    recorder.record(stream, lambda: None)
+    begin(stream, where=WHERE)
+    until(lambda: len(recorded(tmp_path)) == 1 and read_summary(recorded(tmp_path)[0].first))
+    known = WHERE if values else {name: WHERE[name] for name in WHERE if name != "host"}
+    assert recorded(tmp_path)[0].summary.where == known
+    end(stream)
+    recorder.close()
+    assert recorded(tmp_path)[0].summary.where == known
 
 
 def test_the_end_of_a_run_closes_and_finishes_its_file(recorder: Recorder, tmp_path: Path) -> None:

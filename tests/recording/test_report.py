@@ -26,6 +26,7 @@ from bt_actions.story.bare import stripped
 from bt_actions.story.keeping import to_json
 from bt_actions.story.why import why
 from bt_actions.testing import Simulation, VirtualNetwork, VirtualRunner
+from tests.support.every_kind import every_kind
 from tests.support.recordings import bytes_of, record
 from tests.support.stories import state_of
 from tests.support.told_trees import FakeAction, FakeNode, Story
@@ -100,6 +101,23 @@ def test_a_report_has_the_inputs_the_versions_the_files_and_the_actions(
     assert "To the station  /move_robot       3 in 3 visits  SUCCEEDED" in said
     assert isinstance(events[0], RunBegan)
     assert f"run {events[0].run_id}" in said
+
+
+def test_a_report_says_where_the_run_was_and_what_stood_in_for_the_world(tmp_path: Path) -> None:
+    first = record(every_kind(), tmp_path)
+    simulated = "  in a simulation: --sim --speed 2\n  node /all, domain 7"
+    assert f"{simulated}, host robot7\n" in told(first)
+    assert f"{simulated}\n" in told(first, values=False)
+
+
+def test_nobody_is_sent_to_cancel_what_ran_in_the_simulation_of_a_killed_process(
+    story: Story, leaf: FakeNode, tmp_path: Path
+) -> None:
+    story.began = replace(story.began, where={"simulation": "--sim --speed 1"})
+    events = [story.began, story.goal(leaf, "EXECUTING"), story.node(leaf, Status.RUNNING)]
+    said = told(record(events, tmp_path, killed=2.0))
+    assert "    Move: executing on move_robot for " in said
+    assert "cleanup" not in said
 
 
 def test_what_happened_has_a_line_for_each_thing_that_somebody_cares_for(

@@ -41,6 +41,7 @@ NODES = (
     Node(2, 1, "Move", "move", "tree.yaml:5:9", "/move", "Move", {"attempts": 2, "expect": "x"}),
     Node(3, 1, "Say", "log", "tree.yaml:7:9"),
 )
+WHERE = {"node": "/all", "domain": "7", "host": "robot7", "simulation": "--sim --speed 2"}
 SOURCES = {"tree.yaml": "tree: all\n", "../robot.yaml": "actions: {}\n"}
 
 
@@ -57,7 +58,8 @@ def every_kind(rounds: int = 1) -> list[Event]:
     tell(ServerSeen, "/move", True)
     versions = {"bt_actions": "0.1.0"}
     inputs = {"to": float("nan"), "raw": b"\x00\xff", "large": 2**64 - 1}
-    tell(RunBegan, RUN_ID, "all", NODES, inputs, SOURCES, versions, "ab" * 16, "cd" * 16)
+    asked_by = "ab" * 16, "cd" * 16
+    tell(RunBegan, RUN_ID, "all", NODES, inputs, SOURCES, versions, *asked_by, WHERE)
     for number in range(rounds):
         tell(NodeChanged, 1, Status.RUNNING, "")
         tell(RoundBegan, 1, number, rounds, {"at": float("inf")})

@@ -11,7 +11,7 @@ from pathlib import Path
 from bt_actions.events import Event, RunBegan
 from bt_actions.recording import folders, recorder
 from bt_actions.recording.finishing import finish
-from bt_actions.recording.folders import FIRST, Summary, folder_for, write_summary
+from bt_actions.recording.folders import FIRST, folder_for, write_summary
 from bt_actions.recording.mcap_records import Attachment, Message, records
 from bt_actions.recording.writing import RunWriter
 
@@ -41,7 +41,7 @@ def record(
     if killed is not None:
         writer.beat(at.steady + killed, at.wall + killed, at.ros, tick)
     writer.close()
-    write_summary(first, Summary(began.run_id, began.tree, began.at.wall, began.request))
+    write_summary(first, recorder.begun(began))
     if killed is None:
         write_summary(first, recorder.summary(writer.state))
         finish(first)

@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         names = " and ".join(clean(each.tree) for each in begins)
         raise BadInput(f"these are runs of two trees, {names}: runs of one tree are compared")
     found = parting(walks, places, args.tolerance)
-    lines = [*map(_head, _LETTERS, walks), *_inputs(*begins), *_files(*begins)]
+    lines = [*map(_head, _LETTERS, walks), *_where(*begins), *_inputs(*begins), *_files(*begins)]
     lines += _parting(found, places) if found is not None else _same(walks[0])
     write("".join(f"{fit(clean(line))}\n" for line in lines))
     return Exit.SUCCESS if found is None else Exit.FAILURE
@@ -96,6 +96,13 @@ def _head(letter: str, walk: Walk) -> str:
     when = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(began.at.wall))
     lost = f"; {walk.lost} events are not in the recording" if walk.lost else ""
     return "  ".join((letter, began.run_id[:8], began.tree, when, verdict_on(state) + lost))
+
+
+def _where(a: RunBegan, b: RunBegan) -> Iterator[str]:
+    for name in sorted(a.where.keys() | b.where.keys()):
+        one, other = (each.where.get(name, "none") for each in (a, b))
+        if one != other:
+            yield f"{name}: {_both(one, other)}"
 
 
 def _inputs(a: RunBegan, b: RunBegan) -> Iterator[str]:

@@ -106,6 +106,7 @@ def data(report: Report, *, full: bool) -> dict[str, object]:
         "below": report.leaf or None,
         "goal": began.request or None,
         "caller": began.caller or None,
+        "where": dict(began.where),
         "began": began.at.wall,
         "seconds": round(state.elapsed, 3),
         "goes_on": report.goes_on,

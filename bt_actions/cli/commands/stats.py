@@ -22,10 +22,12 @@ _EPILOG = """\
 examples:
   bt-actions stats
   bt-actions stats --tree pick_and_place
+  bt-actions stats --simulated
   bt-actions stats --json | jq '.actions[] | select(.success < 0.9) | .server'
 
-Counted is what lies below the folder that `bt-actions runs` lists, runs in a simulation as well. Of
-each phase of a goal: as long as half of the goals took at most, 95 in a hundred, and all.
+Counted are the runs that `bt-actions runs` lists: those in a simulation (`run --sim`, `--sim-like`)
+are left out, or with --simulated the others. Of each phase of a goal: as long as half of the goals
+took at most, 95 in a hundred, and all.
 Exit codes: 0, or 2 where no run is recorded.
 """
 
@@ -40,6 +42,11 @@ def add_parser(subparsers: Subparsers) -> None:
         epilog=_EPILOG,
     )
     parser.add_argument("--tree", metavar="NAME", default="", help="only runs of this tree")
+    parser.add_argument(
+        "--simulated",
+        action="store_true",
+        help="only runs in a simulation, which else are left out",
+    )
     add_option(parser, "--json", help="print one JSON object")
 
 
@@ -55,18 +62,24 @@ def run(args: argparse.Namespace) -> int:
     if not meant:
         near = did_you_mean(args.tree, {each.summary.tree for each in runs})
         raise BadInput(f"no recorded run is of a tree {args.tree!r}{near}")
-    statistics, counted = Statistics(), 0
+    of_tree = len(meant)
+    meant = [each for each in meant if each.summary.is_simulated == args.simulated]
+    statistics, counted, left_out = Statistics(), 0, of_tree - len(meant)
     with progress(f"of {len(meant)} runs read") as count:
         for number, each in enumerate(meant):
             count(number)
             counted += _add(statistics, each)
     actions = sorted(statistics.actions.items())
     if args.json:
-        told = {"runs": counted, "actions": [data(*each) for each in actions]}
+        told = {"runs": counted, "left_out": left_out, "actions": [data(*each) for each in actions]}
         write(as_json(told) + "\n")
     else:
         lines = [line for each in actions for line in text(*each)]
-        write("".join(f"{clean(line)}\n" for line in [_head(counted), *lines]))
+        others = "in the world left out"
+        if not args.simulated:
+            others = "in a simulation left out (--simulated counts these alone)"
+        more = f"; {left_out} {others}" if left_out else ""
+        write("".join(f"{clean(line)}\n" for line in [_head(counted) + more, *lines]))
     return Exit.SUCCESS
 
 

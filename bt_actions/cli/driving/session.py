@@ -108,6 +108,7 @@ class Session:
                 note(f"bt-actions: {said}")
             try:
                 self._simulator = _Simulator(self._runner, root, robots, simulation)
+                self._runner.where["simulation"] = self._simulator.options
             except BaseException:
                 self._runner.shutdown()
                 raise
@@ -234,17 +235,25 @@ class _Simulator:
         self._simulation: Simulation | RecordedServers | None = None
         runner.on_close(self._close)
         try:
-            self._simulation = self._serve(root, wish)
+            self._simulation, what = self._serve(root, wish)
         except FaultError as error:
             raise BadInput(f"--fault {error}") from error
+        faults = [f"--fault {each}" for each in wish.faults]
+        by_chance = any(each.probability < 1.0 for each in wish.faults)
+        seed = [f"--seed {self._simulation.seed}"] if by_chance else []
+        self.options = " ".join([what, f"--speed {wish.speed:g}", *faults, *seed])
+        """What stands in for the world, in the words of the command line."""
         runner.executor.add_node(self._node)
 
-    def _serve(self, root: Behaviour, wish: SimulationWish) -> Simulation | RecordedServers:
+    def _serve(
+        self, root: Behaviour, wish: SimulationWish
+    ) -> tuple[Simulation | RecordedServers, str]:
+        """Return the servers, and the option that asks for them."""
         settings: dict[str, Any] = {"speed": wish.speed, "faults": wish.faults, "seed": wish.seed}
         if wish.like is None:
             from bt_actions.simulation import Simulation
 
-            return Simulation(self._node, namespaces=self._namespaces, **settings)
+            return Simulation(self._node, namespaces=self._namespaces, **settings), "--sim"
         from bt_actions.recording.reading import RecordingError
         from bt_actions.testing import serve_as_recorded
 
@@ -252,9 +261,10 @@ class _Simulator:
             servers = serve_as_recorded(self._node, root, wish.like, **settings)
         except RecordingError as error:
             raise BadInput(f"--sim-like {error}") from error
+        assert servers.run.began is not None
         for said in servers.remarks:
             note(f"bt-actions: --sim-like: {said}")
-        return servers
+        return servers, f"--sim-like {servers.run.began.run_id}"
 
     def _close(self) -> None:
         """Take note of the world and destroy it all."""

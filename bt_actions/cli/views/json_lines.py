@@ -62,6 +62,7 @@ class JsonView(View):
                         "tree": event.tree,
                         "run": event.run_id,
                         "wall": event.at.wall,
+                        "where": dict(event.where),
                         "inputs": plain(event.inputs),
                         "nodes": [_node(node) for node in event.nodes],
                     }

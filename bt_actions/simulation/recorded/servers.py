@@ -220,6 +220,7 @@ class RecordedServers:
             if isinstance(leaf, ActionBehaviour)
         }
         plan.check(types)
+        self.seed = plan.seed
         self._batteries = [
             Battery(self._stepper, World(), name.removesuffix("move_robot"))
             for name in types
