@@ -26,6 +26,7 @@ from bt_actions.recording.mcap_records import (
     Schema,
     records,
 )
+from bt_actions.utilities.whole_file import replacing
 
 AT_ONCE = 1_000_000
 """Bytes that take less than 0.3 s to finish."""
@@ -80,23 +81,16 @@ def finish_beside(first: Path, *, may_wait: bool) -> subprocess.Popen[bytes] | N
 
 def _rewrite(part: Path) -> bool:
     """Write the records of a file to another one, and put that in its place; else return False."""
-    new = part.with_name(f".{part.name}.new")
-    descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
     try:
-        with os.fdopen(descriptor, "wb") as file, part.open("rb") as source:
+        with replacing(part) as file, part.open("rb") as source:
             writer = Writer(file, chunk_size=_CHUNK, compression=CompressionType.ZSTD)
             writer.start(profile="ros2", library="bt_actions")
             _copy(records(source), writer)
             writer.finish()
             file.flush()
-            os.fsync(descriptor)
-        new.replace(part)
+            os.fsync(file.fileno())
     except _NotOurs:
-        new.unlink(missing_ok=True)
         return False
-    except BaseException:
-        new.unlink(missing_ok=True)
-        raise
     return True
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
-import stat
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 
 def replace_file(path: Path, data: bytes) -> None:
@@ -15,17 +16,27 @@ def replace_file(path: Path, data: bytes) -> None:
     A link still leads to it; its owner and permissions stay. What exists and is no file, as a pipe
     or a device, is written to.
     """
-    before = path.stat() if path.exists() else None
-    if before is not None and not stat.S_ISREG(before.st_mode):
+    if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
+    with replacing(path) as file:
+        file.write(data)
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """Yield the file that is at `path` from the end of the block on, unless that raises.
+
+    A link still leads to it; its owner and permissions stay. Raises OSError.
+    """
+    before = path.stat() if path.exists() else None
     target = Path(os.path.realpath(path))
     new = target.with_name(f".{secrets.token_hex(8)}")  # nobody can have put a link there
     mode = 0o666 if before is None else 0o600
     descriptor = os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
     with os.fdopen(descriptor, "wb") as file:
         try:
-            file.write(data)
+            yield file
             file.flush()
             if before is not None:
                 with contextlib.suppress(OSError):  # only root may give it away

@@ -85,6 +85,22 @@ def test_only_its_user_may_read_it(tmp_path: Path) -> None:
     assert (tmp_path / "run.mcap").stat().st_mode & 0o777 == 0o600
 
 
+def test_finishing_follows_no_link_that_lies_in_wait_and_leaves_those_of_the_user(
+    tmp_path: Path,
+) -> None:
+    victim, first, link = tmp_path / "victim", tmp_path / "run.mcap", tmp_path / "link.mcap"
+    victim.write_bytes(b"mine")
+    (tmp_path / ".run.mcap.new").symlink_to(victim)
+    written(first, every_kind())
+    first.chmod(0o640)
+    link.symlink_to(first)
+    assert finish(link)
+    assert victim.read_bytes() == b"mine"
+    assert link.is_symlink()
+    assert is_finished(first)
+    assert first.stat().st_mode & 0o777 == 0o640
+
+
 def test_a_transition_without_a_text_takes_60_bytes_and_40_when_finished(tmp_path: Path) -> None:
     few, many = tmp_path / "few.mcap", tmp_path / "many.mcap"
     events = every_kind()
