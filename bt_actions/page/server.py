@@ -94,6 +94,7 @@ def server_of(given: Path | None = None) -> uvicorn.Server:
         server_header=False,
         date_header=False,
         limit_concurrency=_MOST,
+        timeout_graceful_shutdown=1,
     )
     server = uvicorn.Server(config)
     config.app = _application(given, lambda: server.should_exit)

@@ -240,6 +240,20 @@ def test_a_browser_that_stops_reading_has_no_more_read_for_it(
         assert read[0] < len(events) + 10 * MOST < 1.5 * len(events)
 
 
+def test_a_browser_that_stops_reading_does_not_keep_the_server_from_its_end(
+    served: Served, begin: Begin
+) -> None:
+    events = told_of(rounds=2500)
+    begin(events).write(events)
+    with socket.socket() as silent:
+        silent.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        silent.connect(("127.0.0.1", served.port))
+        silent.sendall(f"GET /run/{RUN_ID}/events HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        assert silent.recv(100)
+        Told(served).read("beat")  # by then there is no more room for what it does not read
+        served.stop()
+
+
 def test_a_file_that_is_no_recording_is_said_to_be_none(served: Served) -> None:
     record(told_of()).write_bytes(b"no mcap, by far")
     told = Told(served)
