@@ -1,11 +1,12 @@
 """Finishes the files of a run that is over: packed in chunks, with an index, as other readers want.
 
-Run as a process of its own (``python -m bt_actions.recording.finishing FILE``) at low priority, or
+Run as a process of its own (``python -m bt_actions.recording.finishing FILES``) at low priority, or
 on a thread of a process that ticks no tree.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -60,18 +61,23 @@ def finish(first: Path) -> bool:
     return alone and all(done)
 
 
-def finish_beside(first: Path, *, may_wait: bool) -> subprocess.Popen[bytes] | None:
-    """Finish a run's files without holding up a tick: large ones in a process, which is returned.
+def finish_beside(*firsts: Path, may_wait: bool) -> subprocess.Popen[bytes] | None:
+    """Finish runs without holding up a tick: large ones in one process, which is returned.
 
-    Small ones are finished here where the caller may wait, and else when they are opened. Raises
-    OSError.
+    Small ones are finished here where the caller may wait, and else when they are opened. A folder
+    that cannot be written stays as it is. Raises OSError where no process begins.
     """
-    if sum(part.stat().st_size for part in parts_of(first)) <= AT_ONCE:
-        if may_wait:
-            finish(first)
+    large = list[str]()
+    for first in firsts:
+        with contextlib.suppress(OSError):
+            if sum(part.stat().st_size for part in parts_of(first)) > AT_ONCE:
+                large.append(str(first))
+            elif may_wait:
+                finish(first)
+    if not large:
         return None
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", __name__, str(first)],
+        [sys.executable, "-P", "-m", __name__, *large],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
@@ -122,4 +128,6 @@ def _copy(found: Iterator[Record], writer: Writer) -> None:
 
 if __name__ == "__main__":
     os.nice(_NICE)
-    finish(Path(sys.argv[1]))
+    for each in sys.argv[1:]:
+        with contextlib.suppress(OSError):
+            finish(Path(each))

@@ -81,7 +81,6 @@ class Recording:
         self.first, self._run_id = first, run_id
         self.sources: dict[str, str] = {}
         """The tree files by path, as they were recorded."""
-        self.attachments: dict[str, bytes] = {}
         self.damaged = 0
         """Messages that were passed over, and parts of its files that may have held several."""
         self.last_beat: float | None = None
@@ -163,8 +162,6 @@ class Recording:
         path = attachment.name.removeprefix("trees/")
         if path != attachment.name:
             self.sources[path] = attachment.data.decode("utf-8", "replace")
-        else:
-            self.attachments[path] = attachment.data
 
     def _taken(self, message: Message, layout: Layout) -> Iterator[Item]:
         """The event or the state that a message holds, unless it is known."""

@@ -140,7 +140,7 @@ class RunWriter:
     def close(self) -> None:
         """Write what is left, and close the file."""
         self.flush()
-        os.close(self._descriptor)
+        self._close()
 
     # Within
 
@@ -166,12 +166,13 @@ class RunWriter:
         except OSError as error:
             self._give_up(error)
             return
-        os.close(self._descriptor)
+        self._close()
         self._descriptor, self._written = descriptor, 0
         if self._part == THIN_FROM:
             self._say("this run is long: from now on its feedback is kept once a second")
         if self._part >= self._files:
-            part_of(self.first, self._part - self._files + 1).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                part_of(self.first, self._part - self._files + 1).unlink(missing_ok=True)
         self._open()
         state = self.state
         assert state.now is not None
@@ -179,6 +180,10 @@ class RunWriter:
         head = (self._run_id, at.number, *stamp(at.ros))
         self._message(STATE, at, encode(LAYOUTS[STATE], head, (state.tree, to_json(state))))
         self._head = self._buffer.tell()
+
+    def _close(self) -> None:
+        with contextlib.suppress(OSError):  # of a disk that is gone: it was said at the writing
+            os.close(self._descriptor)
 
     def _attach(self, event: RunBegan) -> RunBegan:
         """Keep the tree's files beside the events."""

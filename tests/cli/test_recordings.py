@@ -145,6 +145,18 @@ class TestRuns:
         main(["runs"])
         assert is_finished(four["killed"])
 
+    def test_of_killed_processes_are_finished_by_one_where_they_are_large(
+        self, four: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        killed, begun = [four["killed"], run_of("patrol", 5, Status.RUNNING)], list[list[str]]()
+        monkeypatch.setattr(finishing, "AT_ONCE", 0)
+        monkeypatch.setattr(
+            finishing.subprocess, "Popen", lambda command, **_: begun.append(command)
+        )
+        main(["runs"])
+        [command] = begun
+        assert set(map(str, killed)) < set(command)
+
     def test_are_removed_by_prune_which_says_which(self, capsys: Out) -> None:
         for number in range(22):
             story, leaf = story_of("patrol", number)

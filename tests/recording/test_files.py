@@ -30,6 +30,7 @@ from bt_actions.events.bare import bare
 from bt_actions.recording import finishing, mcap_records, writing
 from bt_actions.recording.finishing import finish, is_finished
 from bt_actions.recording.folders import is_written, parts_of
+from bt_actions.recording.mcap_records import Attachment
 from bt_actions.recording.reading import Recording, RecordingError
 from bt_actions.recording.writing import RunWriter
 from bt_actions.story.state import State
@@ -75,7 +76,9 @@ def test_the_tree_files_the_inputs_and_the_versions_are_kept(tmp_path: Path) -> 
     recording = Recording(tmp_path / "run.mcap")
     recording.state()
     assert recording.sources == SOURCES
-    assert set(recording.attachments) == {"inputs.json", "versions.json"}
+    with (tmp_path / "run.mcap").open("rb") as file:
+        found = [each for each in mcap_records.records(file) if isinstance(each, Attachment)]
+    assert {"inputs.json", "versions.json"} < {each.name for each in found}
 
 
 def test_only_its_user_may_read_it(tmp_path: Path) -> None:
@@ -83,6 +86,20 @@ def test_only_its_user_may_read_it(tmp_path: Path) -> None:
     assert (tmp_path / "run.mcap").stat().st_mode & 0o777 == 0o600
     finish(tmp_path / "run.mcap")
     assert (tmp_path / "run.mcap").stat().st_mode & 0o777 == 0o600
+
+
+def test_large_runs_are_finished_by_one_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(finishing, "AT_ONCE", 0)
+    firsts = [tmp_path / name / "run.mcap" for name in "ab"]
+    for first in firsts:
+        first.parent.mkdir()
+        written(first, every_kind())
+    process = finishing.finish_beside(*firsts, may_wait=True)
+    assert process is not None
+    assert process.wait(60.0) == 0
+    assert all(map(is_finished, firsts))
 
 
 def test_finishing_follows_no_link_that_lies_in_wait_and_leaves_those_of_the_user(
@@ -439,6 +456,20 @@ def test_a_full_disk_leaves_whole_records_and_is_said_once(
     items = told(read(first))
     assert 0 < len(items) < len(events)
     assert items == told(list[Event | State](events))[: len(items)]
+
+
+def test_a_disk_that_is_gone_raises_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(*_: object, **__: object) -> None:
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(writing.os, "close", gone)
+    monkeypatch.setattr(Path, "unlink", gone)
+    writer = written(tmp_path / "run.mcap", every_kind(rounds=40), size=20_000, files=2)
+    monkeypatch.undo()
+    assert not writer.failed
+    assert len(parts_of(tmp_path / "run.mcap")) > 2
 
 
 def test_of_a_bag_with_two_runs_one_is_read(tmp_path: Path) -> None:

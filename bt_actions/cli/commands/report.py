@@ -63,9 +63,11 @@ def run(args: argparse.Namespace) -> int:
 
     with reading(args.run) as recording:
         found = report.reports(recording.first, values=args.values)
-        for _ in range(report.LEVELS):
-            above = None if args.run else report.caller_of(found[0])
-            if above is not None:  # the last run is the one that a person has begun
+        if not args.run:  # the last run is the one that a person has begun
+            for _ in range(report.LEVELS):
+                above = report.caller_of(found[0])
+                if above is None:
+                    break
                 found = report.reports(above, values=args.values)
         if args.output is not None:
             _write(args.output, found, full=args.full)

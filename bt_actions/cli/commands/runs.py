@@ -151,7 +151,6 @@ def _finish(runs: list[Recorded]) -> None:
         return
     from bt_actions.recording.finishing import finish_beside, is_finished
 
-    for each in left:
-        with contextlib.suppress(OSError):  # a folder that cannot be written
-            if not all(map(is_finished, each.parts)):
-                finish_beside(each.first, may_wait=True)
+    with contextlib.suppress(OSError):
+        open_ones = [each.first for each in left if not all(map(is_finished, each.parts))]
+        finish_beside(*open_ones, may_wait=True)
