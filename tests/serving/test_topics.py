@@ -95,7 +95,7 @@ def test_the_example_tells_of_each_event_and_why_a_run_has_failed(
 
     client.until(has_heard, "an end is told")
     watching.line("NodeChanged No luck")
-    watching.line("failed: failure")
+    watching.line("fails.yaml:2:8")
     watching.send(signal.SIGINT)
     assert watching.wait() == 0, watching
     assert not watching.errors, watching
