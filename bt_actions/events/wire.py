@@ -28,6 +28,8 @@ _LATEST = 1e11
 _JSON = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 _EXACT = 2**53
 """Up to which every reader of JSON has whole numbers exactly."""
+_MOST = 2**63
+"""Numbers that count something: beyond 4,300 digits Python writes none."""
 KINDS: dict[str, type[Event]] = {
     name: kind
     for name, kind in vars(kinds).items()
@@ -120,7 +122,7 @@ def _value(data: Any) -> Any:
             case "$bytes":
                 return base64.b64decode(held, validate=True)
             case "$cut":
-                return Cut(_value(held[0]), int(held[1]))
+                return Cut(_value(held[0]), _plain(held[1], int))
             case "$map":
                 return {str(name): _value(item) for name, item in held}
     return {name: _value(item) for name, item in data.items()}
@@ -170,6 +172,8 @@ def _plain(data: Any, wanted: type) -> Any:
     value = _value(data)
     if type(value) is not wanted:
         raise WireError(f"{wanted.__name__} is needed, not {type(value).__name__}")
+    if isinstance(value, int) and not -_MOST <= value < _MOST:
+        raise WireError("a number of 64 bits is needed")
     return value
 
 

@@ -38,7 +38,7 @@ SCALARS = st.none() | st.booleans() | st.integers() | NUMBERS | st.floats() | TE
 
 def _holding(inner: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
     held = st.lists(inner, max_size=3).map(tuple) | st.dictionaries(KEYS, inner, max_size=3)
-    cut = st.builds(Cut, held | TEXTS | st.binary(), st.integers(0, 2**63))
+    cut = st.builds(Cut, held | TEXTS | st.binary(), st.integers(0, 2**63 - 1))
     return held | cut
 
 
@@ -64,7 +64,12 @@ def of(hint: Any) -> st.SearchStrategy[Any]:
     if dataclasses.is_dataclass(hint):
         fields = typing.get_type_hints(hint)
         return st.builds(hint, **{name: of(each) for name, each in fields.items()})
-    return {bool: st.booleans(), int: st.integers() | NUMBERS, float: st.floats(), str: TEXTS}[hint]
+    return {
+        bool: st.booleans(),
+        int: st.integers(-(2**63), 2**63 - 1),
+        float: st.floats(),
+        str: TEXTS,
+    }[hint]
 
 
 @pytest.mark.parametrize("kind", wire.KINDS.values(), ids=list(wire.KINDS))
@@ -166,6 +171,9 @@ WRONG = {
     "bytes that are none": variable('{"$bytes": "é"}'),
     "a cut that is none": variable('{"$cut": 5}'),
     "a cut without an end": variable('{"$cut": [[], 1e400]}'),
+    "a number of 65 bits": OVER % '{"$int": "9223372036854775808"}',
+    "a number of many digits": OVER % ("9" * 4300),
+    "a cut of many digits": variable('{"$cut": [[], %s]}' % ("9" * 4300)),
     "a map that is none": variable('{"$map": [1]}'),
     "inputs that are a number": LINE.replace('"inputs":{"x":[1,2.5]}', '"inputs":5'),
     "settings that are a list": LINE.replace('"settings":{"attempts":3}', '"settings":[]'),
