@@ -194,7 +194,7 @@ class State:
 
     def _remove(self, nodes: tuple[int, ...]) -> None:
         for number in nodes:
-            story = self.nodes.pop(number, None)
+            story = self.nodes.pop(number, None) if number != self.root else None  # always there
             if story is not None and story.node.parent in self.nodes:
                 self.nodes[story.node.parent].children.remove(number)
         self._called.clear()
@@ -392,7 +392,7 @@ class State:
 
     def in_order(self) -> list[int]:
         """Return all nodes, each before its children."""
-        waiting, found = [self.root], list[int]()
+        waiting, found = [key for key in (self.root,) if key in self.nodes], list[int]()
         while waiting:
             node = waiting.pop()
             found.append(node)

@@ -386,3 +386,11 @@ def test_the_first_wish_to_stop_counts_and_a_later_one_may_leave(story: Story) -
     state.observe(StopWanted(story._next(), "again", "left without waiting", abandons=True))
     assert state.stop is not None
     assert (state.stop.who, state.abandoned) == ("SIGINT", True)
+
+
+def test_a_root_is_always_there() -> None:
+    leaf = FakeNode("Leaf")
+    story = Story(FakeNode("Root", [leaf]))
+    state = story.told(story.node(leaf, Status.SUCCESS), story.remove(story.root))
+    assert state.in_order() == [story.root.id, leaf.id]
+    assert State().in_order() == []
