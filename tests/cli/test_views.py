@@ -352,6 +352,14 @@ def test_what_lasted_has_its_line_before_the_event_that_ends_it_also_where_nothi
     ]
 
 
+def test_a_goal_that_waits_on_a_node_that_was_taken_out_has_no_line(
+    leaves: list[FakeNode], story: Story
+) -> None:
+    lines = Lines(story.began, story.goal(leaves[0], "QUEUED"), story.remove(leaves[0]))
+    lines.feeding.frame(story.time + LASTING)
+    assert lines.said == []
+
+
 def test_a_wish_to_stop_is_told_with_what_is_canceled(leaves: list[FakeNode], story: Story) -> None:
     lines = Lines(story.began, story.goal(leaves[0], "EXECUTING"))
     lines.feed(StopWanted(story._next(), "SIGINT", "interrupted by SIGINT"))
@@ -595,6 +603,17 @@ def test_the_live_part_leaves_lines_for_what_scrolls_by(
     assert 1 <= len(drawn) <= max(1, height / 3, height - 1 - SCROLLS)
     if height >= 12:
         assert any("Step 4" in line for line in drawn), "what runs is shown first"
+    view.close()
+
+
+@pytest.mark.parametrize("name", ["\x1b[31mred", "\ud800", "two\nlines"])
+def test_a_node_s_name_gives_the_terminal_no_commands(name: str) -> None:
+    screen, state, story = Screen(30), State(), Story(FakeNode(name, [FakeNode("Leaf")]))
+    view = LiveView(state, screen.console)
+    feed(state, view, story.began)
+    view.frame(story.time)
+    assert b"\x1b[31m" not in screen.raw.getvalue()
+    assert len(screen.lines()) == 3
     view.close()
 
 

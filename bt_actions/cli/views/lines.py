@@ -12,6 +12,7 @@ from bt_actions.events import (
     Event,
     GoalChanged,
     NodeChanged,
+    NodesRemoved,
     RoundBegan,
     RunBegan,
     StopWanted,
@@ -53,6 +54,9 @@ class LineView(View):
         match event:
             case RunBegan():
                 self._nodes.clear()
+            case NodesRemoved():
+                for node in event.nodes:
+                    self._passing.pop(node, None)
             case NodeChanged():
                 self._node(event)
             case TickLasts():

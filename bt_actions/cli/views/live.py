@@ -210,7 +210,7 @@ class LiveView(View):
         text = Text((" " if narrow else "  ") * depth)
         text.append(f"{self._glyph(status)} ", style=_STYLES[status])
         for name in filter(None, (mark, story.node.name)):
-            said = Text(name, style="dim" if status is Status.INVALID else "")
+            said = Text(clean(name), style="dim" if status is Status.INVALID else "")
             self._fit(said, max(12, self._width // (4 if mark else 2)))
             text.append_text(said)
             text.append(": " if name is mark else "")
