@@ -10,6 +10,7 @@ import pytest
 
 from bt_actions.cli.program import main
 from bt_actions.events import Event, GoalChanged, RunBegan
+from bt_actions.recording.folders import held
 from tests.support.recordings import record
 from tests.support.virtual_runs import NIGHT, run_of
 
@@ -157,7 +158,7 @@ def test_tree_files_that_differ_are_told(
     assert [line.rstrip() for line in lines_of(capsys)[2:-1]] == [each.rstrip() for each in told]
 
 
-def test_a_run_of_a_killed_process_did_nothing_more(
+def test_a_run_that_has_not_finished_says_why_it_did_nothing_more(
     tmp_path: Path, recorded: Recorded, capsys: pytest.CaptureFixture[str]
 ) -> None:
     night = run_of(NIGHT)
@@ -165,7 +166,10 @@ def test_a_run_of_a_killed_process_did_nothing_more(
     assert main(["diff", recorded(night), str(killed)]) == 1
     lines = lines_of(capsys)
     assert "  NOT FINISHED after " in lines[1]
-    assert lines[-1] == "  B  nothing more there"
+    assert lines[-1] == "  B  nothing more: its process was killed"
+    with held(killed, alone=True):
+        assert main(["diff", recorded(changed(night, run_id="b" * 32)), str(killed)]) == 1
+    assert lines_of(capsys)[-1] == "  B  nothing yet: the run goes on"
 
 
 def test_what_a_run_says_gives_the_terminal_no_commands(

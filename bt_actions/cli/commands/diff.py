@@ -61,27 +61,34 @@ def run(args: argparse.Namespace) -> int:
     from bt_actions.recording.comparing import Places, parting
 
     places = Places()
-    walks = _walk(args.a, places), _walk(args.b, places)
+    (a, last_a), (b, last_b) = _walk(args.a, places), _walk(args.b, places)
+    walks = a, b
     begins = _began(walks[0]), _began(walks[1])
     if begins[0].tree != begins[1].tree:
         names = " and ".join(clean(each.tree) for each in begins)
         raise BadInput(f"these are runs of two trees, {names}: runs of one tree are compared")
     found = parting(walks, places, args.tolerance)
     lines = [*map(_head, _LETTERS, walks), *_where(*begins), *_inputs(*begins), *_files(*begins)]
-    lines += _parting(found, places) if found is not None else _same(walks[0])
+    lines += _parting(found, places, (last_a, last_b)) if found is not None else _same(walks[0])
     write("".join(f"{fit(clean(line))}\n" for line in lines))
     return Exit.SUCCESS if found is None else Exit.FAILURE
 
 
-def _walk(run: str, places: Places) -> Walk:
+def _walk(run: str, places: Places) -> tuple[Walk, str]:
+    """Return what the run did, and why nothing comes behind that."""
     from bt_actions.recording.comparing import Walk
+    from bt_actions.recording.folders import is_written
     from bt_actions.recording.reading import RecordingError
 
     with reading(run) as recording:
         walk = Walk(recording.items(), places)
         if walk.state.began is None:
             raise RecordingError(f"{recording.first} holds no run")
-    return walk
+        if walk.state.finished is not None or walk.state.ended is not None:
+            return walk, "nothing more there"
+        if is_written(recording.first):
+            return walk, "nothing yet: the run goes on"
+        return walk, "nothing more: its process was killed"
 
 
 def _began(walk: Walk) -> RunBegan:
@@ -133,7 +140,7 @@ def _both(one: str, other: str) -> str:
     return f"A {fit(one, 100)} | B {fit(other, 100)}"
 
 
-def _parting(found: Parting, places: Places) -> Iterator[str]:
+def _parting(found: Parting, places: Places, ends: tuple[str, str]) -> Iterator[str]:
     if found.last is None:
         yield "the same up to there: nothing"
     else:
@@ -141,8 +148,8 @@ def _parting(found: Parting, places: Places) -> Iterator[str]:
         last = f"the last of {where}: {found.last.text}"
         yield f"the same up to there: {found.common} outcomes, {last}"
     yield f"the runs part at {' / '.join(found.path)}"
-    for letter, step in zip(_LETTERS, found.sides, strict=True):
-        told = "nothing more there" if step is None else f"{step.seconds:.2f} s  {step.text}"
+    for letter, step, end in zip(_LETTERS, found.sides, ends, strict=True):
+        told = end if step is None else f"{step.seconds:.2f} s  {step.text}"
         yield f"  {letter}  {told}"
 
 
