@@ -64,9 +64,9 @@ def reason_of(outcome: Outcome | None, reason: str) -> str:
 
 
 def bare_node(node: Node) -> Node:
-    """Return a node with those of its policies alone that are no values of the robot's."""
+    """Return a node with those of its policies alone that are no values, and in no folder."""
     kept = {name: each for name, each in node.settings.items() if name in _SETTINGS}
-    return replace(node, settings=kept)
+    return replace(node, settings=kept, place=node.place.rpartition("/")[2])
 
 
 def _hidden(values: Any) -> dict[str, Any]:

@@ -76,6 +76,12 @@ class Report:
         return max(self.state.elapsed, 0.0 if beat is None else beat - began.at.wall)
 
     @property
+    def files(self) -> list[str]:
+        """The tree files; without values, their names alone."""
+        paths = list(self.recording.sources)
+        return paths if self.values else sorted({path.rpartition("/")[2] for path in paths})
+
+    @property
     def ending(self) -> str:
         """How the run ended, in a few words."""
         state = self.state
@@ -221,8 +227,8 @@ def _head(report: Report) -> Iterator[str]:
         yield f"output {name}: {brief(value)}"
     if began.versions:
         yield ", ".join(f"{name} {version}" for name, version in began.versions.items())
-    if recording.sources:
-        yield f"tree files {', '.join(recording.sources)}"
+    if report.files:
+        yield f"tree files {', '.join(report.files)}"
     if report.values:  # the name of a folder is nobody's business either
         more = len(parts_of(recording.first)) - 1
         yield f"recorded in {recording.first}{f' and {more} more files' if more > 0 else ''}"

@@ -303,6 +303,8 @@ def test_without_values_a_report_holds_none_of_them(
         assert "ABORTED: aborted by /move_robot" in said
         assert "To the station  /move_robot       3 in 3 visits  SUCCEEDED" in said
         assert str(tmp_path) not in said
+        assert "night.yaml:" in said
+        assert "examples/" not in said
 
 
 def test_a_run_that_is_recorded_without_values_holds_none(

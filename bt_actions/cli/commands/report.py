@@ -119,7 +119,7 @@ def data(report: Report, *, full: bool) -> dict[str, object]:
         "inputs": plain(began.inputs),
         "outputs": plain(state.outputs),
         "versions": dict(began.versions),
-        "files": sorted(recording.sources),
+        "files": sorted(report.files),
         "why": why(state, state.started + report.lived),
         "actions": [action_data(each, state.latest) for each in state.actions],
         "damaged": recording.damaged,
