@@ -73,7 +73,7 @@ class RunBegan(Event):
     sources: Mapping[str, str]
     """The tree files by path, as they were read."""
     versions: Mapping[str, str]
-    """Of bt_actions, py_trees and Python."""
+    """Of bt_actions, py_trees, rclpy and Python."""
     request: str = ""
     """The UUID of the RunTree goal that the run answers, in hexadecimal; or ""."""
     caller: str = ""

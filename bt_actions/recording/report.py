@@ -15,8 +15,9 @@ from pathlib import Path
 
 from bt_actions.recording.folders import Recorded, home, is_written, parts_of, recorded
 from bt_actions.recording.reading import Recording, RecordingError
-from bt_actions.recording.timeline import Line, Timeline, clock
+from bt_actions.recording.timeline import Line, Timeline
 from bt_actions.story.state import State
+from bt_actions.story.values import clock
 from bt_actions.story.why import why
 from bt_actions.story.words import action_table, left_open, troubles, verdict
 from bt_actions.utilities.plain_text import clean

@@ -6,7 +6,6 @@ and what a tick does on its way, have none.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -39,7 +38,7 @@ from bt_actions.recording.reading import Item, Recording
 from bt_actions.story.actions import DONE, ActionStory, GoalStory
 from bt_actions.story.bare import stripped
 from bt_actions.story.state import OVER, State
-from bt_actions.story.values import opened
+from bt_actions.story.values import clock, opened
 from bt_actions.story.why import attempt_text
 from bt_actions.story.words import error_text
 from bt_actions.utilities.names import told_apart
@@ -207,11 +206,6 @@ class Timeline:
             return ""
         end = f"ended {event.end}" if event.end is not None else "is left"
         return f"the goal that was left {end}{f': {event.reason}' if event.reason else ''}"
-
-
-def clock(wall: float) -> str:
-    """Return a moment of the computer's clock as its users read it."""
-    return time.strftime("%H:%M:%S", time.localtime(wall))
 
 
 def _judged(action: ActionStory, goal: GoalStory) -> str:

@@ -131,7 +131,7 @@ class ActionStory:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether that is so of the latest goal."""
+        """Whether the latest goal has not begun as far as its server knows, which may change."""
         return self.latest is not None and self.latest.in_doubt
 
     @property

@@ -1,4 +1,4 @@
-"""A run's actions as a table, and why its tree failed, as lines."""
+"""A run's actions as a table, in lines."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
 from functools import partial
 
@@ -72,3 +73,8 @@ def named(constants: Constants, field: str, value: int) -> str:
     named = constants.get(field)
     name = named.get(str(value)) if isinstance(named, dict) else None
     return name if isinstance(name, str) else str(value)
+
+
+def clock(wall: float) -> str:
+    """Return a moment of the computer's clock as its users read it."""
+    return time.strftime("%H:%M:%S", time.localtime(wall))

@@ -7,7 +7,6 @@ terminal, `--json`, RunTree's result, the diagnostics, a failed assertion over a
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Iterable, Iterator
 
 from py_trees.common import Status
@@ -19,7 +18,7 @@ from bt_actions.story.actions import DONE, ActionStory, GoalStory
 from bt_actions.story.doing import did_text, doing
 from bt_actions.story.failures import Failure
 from bt_actions.story.state import State
-from bt_actions.story.values import LONG, opened, round_text, unmet_text
+from bt_actions.story.values import LONG, clock, opened, round_text, unmet_text
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import brief, fit, shorten
 
@@ -59,7 +58,7 @@ def why(state: State, now: float | None = None) -> list[str]:
         return waits(state, state.latest if now is None else now)
     stories = [list(_told(failure, state)) for failure in state.failures]
     if state.finished.error:
-        stories = [[clean(f"{_clock(state.finished.at.wall)}  {state.finished.error}")]]
+        stories = [[clean(f"{clock(state.finished.at.wall)}  {state.finished.error}")]]
     elif state.status is Status.INVALID and state.stopped:
         stories = [["stopped while it ran:"], *(list(_told(each, state)) for each in state.stopped)]
     if not stories:
@@ -106,7 +105,7 @@ def waits(state: State, now: float) -> list[str]:
 def _told(failure: Failure, state: State) -> Iterator[str]:
     """Yield when, where and in which item it failed; each attempt; who passed it on."""
     items = _items(failure.items)
-    yield clean(f"{_clock(failure.at.wall)}  {' / '.join(failure.path)}{items}")
+    yield clean(f"{clock(failure.at.wall)}  {' / '.join(failure.path)}{items}")
     if failure.ran is not None:
         yield clean(f"  {did_text(failure)}")
     if failure.ran is None or failure.attempts:
@@ -195,13 +194,9 @@ def _dealt_with(state: State) -> Iterator[str]:
         tries += f", {times} times" if times > 1 else ""
         by = f"; {failure.by.name} ({failure.by.kind}) went on" if failure.by is not None else ""
         name = state.called(failure.node.id)
-        yield clean(f"  {_clock(failure.at.wall)}  {name}{items}, failed{tries}: {brief(said)}{by}")
+        yield clean(f"  {clock(failure.at.wall)}  {name}{items}, failed{tries}: {brief(said)}{by}")
 
 
 def _items(rounds: Iterable[tuple[Node, RoundBegan]]) -> str:
     told = (round_text(begun, f" of {loop.name}") for loop, begun in rounds)
     return "".join(f", {each}" for each in told)
-
-
-def _clock(wall: float) -> str:
-    return time.strftime("%H:%M:%S", time.localtime(wall))

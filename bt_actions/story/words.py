@@ -22,7 +22,8 @@ from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import MESSAGE, brief, fit, shorten
 from bt_actions.utilities.suggest import listing
 
-_NOTHING = RunEnded(Moment(0, 0.0, 0.0, 0.0), 0)
+NO_END = RunEnded(Moment(0, 0.0, 0.0, 0.0), 0)
+"""In place of the end of a run that has none."""
 MOST = 3
 """Of many actions that are waited for, or many items of a list, how many are shown."""
 MANY = 20
@@ -42,7 +43,7 @@ def verdict(status: Status, seconds: float | None) -> str:
 
 
 def verdict_on(state: State) -> str:
-    """Say how a run has ended; of what was left of a run that it has not."""
+    """Say how a run has ended, or that it has not finished."""
     if state.finished is None and state.ended is None:
         return f"NOT FINISHED after {state.elapsed:.2f} s"
     return verdict(state.status, state.elapsed)
@@ -50,7 +51,7 @@ def verdict_on(state: State) -> str:
 
 def last_words(state: State, width: int = MESSAGE) -> list[str]:
     """Return the table, the verdict, how long it took, and last what went wrong."""
-    ended = state.ended or _NOTHING
+    ended = state.ended or NO_END
     cause = f", {ended.cause}" if ended.cause else ""
     if ended.complaint and state.status is Status.SUCCESS:
         cause += ", but not as it should be"
@@ -87,7 +88,7 @@ def troubles(state: State) -> list[str]:
 
 def left_open(state: State) -> list[str]:
     """Return what went wrong beside the tree, and what is not known, the gravest last."""
-    ended = state.ended or _NOTHING
+    ended = state.ended or NO_END
     lines = [line for line in (ended.complaint, error_text(state)) if line]
     left = {each.server for each in state.actions if each.left_at_server or each.live}
     if left and not state.simulation:  # which ended with the run's process

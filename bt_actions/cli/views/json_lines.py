@@ -14,12 +14,10 @@ from bt_actions.events import (
     Cut,
     Event,
     GoalChanged,
-    Moment,
     Node,
     NodeChanged,
     RoundBegan,
     RunBegan,
-    RunEnded,
     StopWanted,
     TickLasts,
     Value,
@@ -29,7 +27,7 @@ from bt_actions.story.actions import ActionStory
 from bt_actions.story.failures import Failure
 from bt_actions.story.state import State
 from bt_actions.story.why import why
-from bt_actions.story.words import stopping_text
+from bt_actions.story.words import NO_END, stopping_text
 from bt_actions.utilities.plain_text import as_json
 
 KINDS = {
@@ -41,8 +39,6 @@ KINDS = {
     AttemptEnded: "attempt",
 }
 """The events of a node that are written, as `event` has them."""
-_NOTHING = RunEnded(Moment(0, 0.0, 0.0, 0.0), 0)
-"""In place of the end of a recorded run that has none."""
 
 
 class JsonView(View):
@@ -82,7 +78,7 @@ class JsonView(View):
 
     def _finished(self) -> dict[str, object]:
         state = self._state
-        ended, finished = state.ended or _NOTHING, state.finished
+        ended, finished = state.ended or NO_END, state.finished
         error = (finished is not None and finished.error) or ended.error
         return {
             "event": "finished",
