@@ -106,6 +106,7 @@ def test_a_run_that_failed_says_why_first_with_the_line_of_the_file(over: Page) 
         assert passed_on in strip
     assert over.text("#status", "Failed") == "Failed"
     assert over.text("#conn", "Replay") == "Replay"
+    assert over.text("#tree-where", "simulated").startswith("simulated")
     assert over.text("#details h2", "Home").split() == ["Home", "Failed"]
     assert "fault: abort" in over.text("#details", "Result")
     assert "once: Home" in over.text(".yaml .at", "Home")

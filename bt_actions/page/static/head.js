@@ -51,7 +51,9 @@ export function create_head(app) {
   function update() {
     const { run, link } = app, { info } = run, small = app.narrow.matches;
     text(find("tree-name"), info.tree || "…");
-    text(find("tree-where"), info.wall ? `${when(info.wall)}  ·  run ${info.id.slice(0, 8)}` : "");
+    const { host, node, domain, simulation } = info.where || {}, place = find("tree-where");
+    text(place, info.wall ? [simulation && "simulated", host, when(info.wall), `run ${info.id.slice(0, 8)}`].filter(Boolean).join("  ·  ") : "");
+    place.title = [simulation, node, domain && `domain ${domain}`, info.id].filter(Boolean).join(", ");
     const [word, look] = standing(), pill = find("status"), key = word + look;
     if (pill.dataset.k !== key) {
       pill.dataset.k = key;

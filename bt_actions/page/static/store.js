@@ -71,7 +71,7 @@ export class Run {
   }
 
   enter(e) {
-    Object.assign(this.info, { id: e.run_id, tree: e.tree, inputs: e.inputs, wall: e.at[2], versions: e.versions, request: e.request });
+    Object.assign(this.info, { id: e.run_id, tree: e.tree, inputs: e.inputs, wall: e.at[2], versions: e.versions, where: e.where || {}, request: e.request });
     Object.assign(this.files, e.sources);
     this.grow(e.nodes);
   }
