@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import json
 import random
-from collections.abc import Iterable
+import shutil
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,13 +15,16 @@ from typing import Any
 import pytest
 from mcap.writer import Writer
 
+from bt_actions.cli import main
 from bt_actions.cli.commands.report import data
 from bt_actions.events import GoalChanged, to_line
 from bt_actions.recording import reading
 from bt_actions.recording.folders import summary_of
 from bt_actions.recording.layout import CHANNELS, EVENTS, LAYOUTS, STATE, encode
-from bt_actions.recording.reading import RecordingError
+from bt_actions.recording.reading import Recording, RecordingError
 from bt_actions.recording.report import markdown, reports, text
+from bt_actions.recording.statistics import Statistics
+from bt_actions.recording.tape import Tape
 from bt_actions.story.keeping import to_json
 from bt_actions.utilities.plain_text import as_json
 from tests.support.every_kind import every_kind
@@ -66,8 +71,8 @@ def whole(first: Path) -> str:
         return str(error)
 
 
-def changed(plain: Any, chance: random.Random) -> Any:
-    """Plain data with an extreme value somewhere in it."""
+def changed(plain: Any, chance: random.Random, *, alike: bool = False) -> Any:
+    """Plain data with an extreme value somewhere in it; with `alike` one of the same type."""
     plain = copy.deepcopy(plain)
     at, places = plain, list[tuple[Any, Any]]()
     waiting = [at]
@@ -76,9 +81,10 @@ def changed(plain: Any, chance: random.Random) -> Any:
         keys = list(at) if isinstance(at, dict) else range(len(at))
         places += [(at, key) for key in keys]
         waiting += [at[key] for key in keys if isinstance(at[key], dict | list)]
-    for _ in range(chance.randrange(1, 4)):
+    for _ in range(1 if alike else chance.randrange(1, 4)):
         holder, key = chance.choice(places)
-        holder[key] = copy.deepcopy(chance.choice(EXTREMES))
+        same = [each for each in EXTREMES if type(each) is type(holder[key])] if alike else []
+        holder[key] = copy.deepcopy(chance.choice(same or EXTREMES))
     return plain
 
 
@@ -101,9 +107,69 @@ def test_no_state_makes_more_than_an_error_in_words(tmp_path: Path, seed: int) -
     middle = len(events) // 2
     plain = json.loads(to_json(state_of(events[:middle])))
     texts = [to_line(event) for event in events[middle:]]
+    said = 0
     for _ in range(60):
-        state = json.dumps(changed(plain, chance))
-        assert whole(raw(tmp_path / "run.mcap", texts, state))
+        state = json.dumps(changed(plain, chance, alike=chance.random() < 0.7))
+        said += "holds no run" not in whole(raw(tmp_path / "run.mcap", texts, state))
+    assert said > 10, "many of them have a report"
+
+
+def done(words: list[str]) -> None:
+    code = main(words)
+    assert code in (0, 1, 2)
+    if code == 2:
+        raise RecordingError("which was said")
+
+
+def replayed(first: Path, *words: str) -> None:
+    done(["replay", str(first), *words])
+
+
+def played(first: Path) -> None:
+    tape = Tape(Recording(first))
+    for position in range(0, len(tape), 5):
+        tape.seek(position)
+
+
+def compared(first: Path) -> None:
+    good = record(every_kind(rounds=2))
+    try:
+        done(["diff", str(first), str(good)])
+    finally:
+        shutil.rmtree(good.parent)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    "reader",
+    [
+        lambda first: replayed(first, "--plain"),
+        lambda first: replayed(first, "--plain", "--verbose"),
+        lambda first: replayed(first, "--json"),
+        played,
+        compared,
+        lambda first: Statistics().add(Recording(first).items()),
+    ],
+    ids=["lines", "all lines", "json", "played", "diff", "stats"],
+)
+def test_no_recording_makes_more_than_an_error_in_words_for_any_reader(
+    tmp_path: Path, seed: int, reader: Callable[[Path], None]
+) -> None:
+    chance, events = random.Random(seed), every_kind(rounds=2)
+    middle = len(events) // 2
+    texts = [json.loads(to_line(event)) for event in events]
+    state, read = json.loads(to_json(state_of(events[:middle]))), 0
+    for number in range(20):
+        some = [
+            json.dumps(changed(each, chance, alike=True) if chance.random() < 0.1 else each)
+            for each in texts
+        ]
+        head = json.dumps(changed(state, chance, alike=True)) if number % 2 else ""
+        first = raw(tmp_path / "run.mcap", some[middle:] if head else some, head)
+        with contextlib.suppress(RecordingError, RecursionError):
+            reader(first)
+            read += 1
+    assert read > 8, "most of them are read"
 
 
 @pytest.mark.parametrize(
@@ -202,8 +268,6 @@ def test_no_name_ends_what_markdown_shows_as_text(tmp_path: Path) -> None:
 def test_an_attachment_is_written_nowhere(
     tmp_path: Path, name: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from bt_actions.cli import main
-
     folder = tmp_path / "a" / "b"
     folder.mkdir(parents=True)
     monkeypatch.chdir(folder)
@@ -220,8 +284,6 @@ def test_an_attachment_is_written_nowhere(
 def test_no_summary_makes_more_than_a_line_that_fits(
     tmp_path: Path, extreme: Any, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from bt_actions.cli import main
-
     first = record(every_kind())
     summary = json.loads(summary_of(first).read_text())
     for key in summary:
