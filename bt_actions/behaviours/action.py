@@ -83,6 +83,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
     Raises ValueError for a policy, an expression or a place that makes no sense.
     """
 
+    in_words = "action"
     __slots__ = ("_attempts", "_handle", "_left_behind", "_outcome", "_reading", "_shown")
 
     def __init__(

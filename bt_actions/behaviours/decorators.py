@@ -94,6 +94,8 @@ class Deadline(Gate):
         after: seconds on the node's clock; may raise ValueError, which fails.
     """
 
+    in_words = "timeout"
+
     def __init__(self, name: str, child: Behaviour, after: Callable[[], object]) -> None:
         super().__init__(name, child)
         self._after = after
@@ -157,6 +159,8 @@ class Subtree(Gate):
             one that does not fit, which fails the subtree.
     """
 
+    passes_on = True
+
     def __init__(
         self, name: str, child: Behaviour, begin: Callable[[], None], end: Callable[[], None]
     ) -> None:
@@ -193,6 +197,7 @@ class Repeat(Gate):
         times: how often in all; for ever where not given. May raise ValueError, which fails.
     """
 
+    passes_on = True
     _again, _counts, _least = Status.SUCCESS, "times", 0
     _pauses = Retry()
 
@@ -257,6 +262,8 @@ class RetryChild(Repeat):
         retry: the pauses, on the node's clock.
     """
 
+    passes_on = True
+    in_words = "retry"
     _again, _counts, _least = Status.FAILURE, "attempts", 1
 
     def __init__(self, name: str, child: Behaviour, attempts: Number, retry: Retry) -> None:
@@ -286,6 +293,8 @@ class ForEach(Repeat):
         keep_going: whether an item that failed is left behind; the node then succeeds if any item
             did, or the list was empty.
     """
+
+    passes_on = True
 
     def __init__(
         self,

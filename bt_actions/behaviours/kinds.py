@@ -4,43 +4,40 @@ from __future__ import annotations
 
 import re
 
+from py_trees import behaviours, composites, decorators
 from py_trees.behaviour import Behaviour
 from py_trees.composites import Parallel, Selector, Sequence
 
 from bt_actions.behaviours.parallel import Parallel as OwnParallel
 
 _WORDS = {
-    "Sequence": "sequence",
-    "Selector": "fallback",
-    "Parallel": "parallel",
-    "Inverter": "invert",
-    "FailureIsSuccess": "force_success",
-    "SuccessIsFailure": "force_failure",
-    "OneShot": "run_once",
-    "Retry": "retry",
-    "Repeat": "repeat",
-    "Timeout": "timeout",
-    "Success": "success",
-    "Failure": "failure",
-    "Running": "running",
-    "ActionBehaviour": "action",
-    "CallService": "service",
-    "RunTree": "run_tree",
-    "Deadline": "timeout",
-    "RetryChild": "retry",
-    "SetValues": "set",
+    composites.Sequence: "sequence",
+    composites.Selector: "fallback",
+    composites.Parallel: "parallel",
+    decorators.Inverter: "invert",
+    decorators.FailureIsSuccess: "force_success",
+    decorators.SuccessIsFailure: "force_failure",
+    decorators.OneShot: "run_once",
+    decorators.Retry: "retry",
+    decorators.Repeat: "repeat",
+    decorators.Timeout: "timeout",
+    behaviours.Success: "success",
+    behaviours.Failure: "failure",
+    behaviours.Running: "running",
 }
+"""The words for classes of py_trees. One of ours says its own by `in_words`, or by its name."""
 
 
 def kind(node: Behaviour) -> str:
     """Return what `node` is, in the words of the YAML language where it has one."""
     word = type(node).__name__
     for base in type(node).__mro__:
-        if base.__name__ in _WORDS and base.__module__.startswith(("py_trees.", "bt_actions.")):
-            word = _WORDS[base.__name__]
+        if base in _WORDS:
+            word = _WORDS[base]
             break
         if base.__module__.startswith("bt_actions."):
-            word = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", base.__name__).lower()
+            name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", base.__name__).lower()
+            word = vars(base).get("in_words", name)
             break
     if isinstance(node, Selector | Sequence) and not node.memory:
         return f"reactive {word}"

@@ -85,6 +85,8 @@ class Check(Leaf):
 class SetValues(Leaf):
     """Computes values and writes them, which `write` does; all or none."""
 
+    in_words = "set"
+
     def __init__(self, name: str, write: Callable[[], None]) -> None:
         super().__init__(name)
         self._write = write

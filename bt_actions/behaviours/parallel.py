@@ -22,6 +22,8 @@ class Parallel(PyTreesParallel):
         at_least: how many children must succeed; all of them where not given.
     """
 
+    passes_on = True
+
     def __init__(
         self, name: str, children: Sequence[Behaviour], *, at_least: int | None = None
     ) -> None:

@@ -34,6 +34,7 @@ class CallService(Connected[Service], Limited):
         read: called with the answer; gives what is wrong with it, or an empty text.
     """
 
+    in_words = "service"
     _call: Call | None = None
     _pausing = False
 

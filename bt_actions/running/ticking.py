@@ -11,8 +11,6 @@ from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
 
 from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.decorators import ForEach, Repeat, RetryChild, Subtree
-from bt_actions.behaviours.parallel import Parallel
 
 QUIET_REST = 2.0
 """Seconds until a tree is ticked in which nothing watches the clock; a longer heartbeat counts."""
@@ -24,13 +22,11 @@ _PASS_ON = {
     decorators.FailureIsSuccess,
     decorators.SuccessIsFailure,
     decorators.OneShot,
-    Parallel,
-    Subtree,
-    RetryChild,
-    Repeat,
-    ForEach,
 }
-"""Kinds that make their status of that of their children, and look at nothing else."""
+"""Classes of py_trees that make their status of that of their children, and look at nothing else.
+
+One of ours says so of itself by `passes_on`; a class that is made of it may look at more.
+"""
 
 
 def tick_once(tree: BehaviourTree, changes: ChangeVisitor) -> None:
@@ -153,7 +149,10 @@ class ChangeVisitor(VisitorBase):
     def watching(self) -> bool:
         """Whether any that was ticked may watch what tells nobody, as the clock or a variable."""
         ours = ActionBehaviour.tick, ActionBehaviour.update
-        return any((kind.tick, kind.update) != ours for kind in self._kinds - _PASS_ON)
+        return any(
+            (kind.tick, kind.update) != ours and not vars(kind).get("passes_on")
+            for kind in self._kinds - _PASS_ON
+        )
 
     @property
     def may_go_on(self) -> bool:

@@ -8,7 +8,21 @@ import weakref
 import py_trees
 from py_trees.composites import Sequence
 
+from bt_actions.behaviours.decorators import Repeat
 from bt_actions.running.ticking import ChangeVisitor
+
+
+def test_a_class_that_is_made_of_one_may_look_at_more() -> None:
+    class Curious(Repeat):
+        pass
+
+    for make, watched in ((Repeat, False), (Curious, True)):
+        visitor = ChangeVisitor(lambda: None, lambda: "")
+        node = make("R", py_trees.behaviours.Success("A"), None)
+        node.tick_once()
+        visitor.run(node)
+        visitor.finish()
+        assert visitor.watching is watched
 
 
 def test_what_was_pruned_in_a_run_is_not_kept() -> None:
