@@ -15,6 +15,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from bt_actions.document.findings.rules import RULES
+from bt_actions.document.kinds import KINDS
 from bt_actions.document.language.keys import (
     ACTION_KEYS,
     ALIAS,
@@ -22,11 +23,12 @@ from bt_actions.document.language.keys import (
     OUTPUT,
     RETRY,
     SERVICE_RETRY,
+    SERVICE_TIMEOUT,
     TIMEOUT,
     TOP_KEYS,
     TOPIC,
 )
-from bt_actions.document.language.kinds import KINDS, SERVICE_TIMEOUT, Group, Kind
+from bt_actions.document.language.kinds import Group, Kind
 from bt_actions.document.language.scalars import Shape, Text
 from bt_actions.document.language.shapes import Key, Record
 from bt_actions.expressions.functions import ARGUMENTS

@@ -1,8 +1,9 @@
 """Trees written in YAML: read, checked and built. A library for editors and services, too.
 
-`findings/` says what is wrong, `yaml/` reads text, `language/` knows kinds and keys, `reading/`
-makes documents; above them, side by side, `checking/`, `building/` and `formatting/`; `load.py`
-puts them together. Importing this imports neither rclpy nor any message package.
+`findings/` says what is wrong, `yaml/` reads text, `language/` knows keys and what a kind is,
+`reading/` makes documents; above them, side by side, `checking/` and `building/`; on top of these
+`kinds/`, a file each; `formatting/` and `load.py` put them together. Importing this imports neither
+rclpy nor any message package.
 """
 
 from importlib import import_module

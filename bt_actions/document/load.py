@@ -12,6 +12,7 @@ from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
+import bt_actions.document.kinds  # noqa: F401  (fills the table that all others read)
 from bt_actions.document.checking.check import check_document
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.hazards import find_hazards

@@ -77,8 +77,8 @@ def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str,
         if isinstance(found, type | str) and found:
             return found, kind
     if written is not None:
-        name = written.values.get("type")
-        if written.kind.name in ("publish", "wait_for_message") and isinstance(name, str):
+        name, used = written.values.get("type"), written.kind.interface
+        if used is not None and used.kind == "msg" and isinstance(name, str):
             return name, "msg"
     return None
 

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from bt_actions.document.findings import elsewhere
-from bt_actions.document.language.kinds import KINDS
+from bt_actions.document.kinds import KINDS
 
 
 @pytest.mark.parametrize("said", sorted(set(elsewhere._KINDS.values())))

@@ -20,10 +20,12 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory
 
+from bt_actions.behaviours.kinds import kind as in_words
 from bt_actions.document import check_file, load_tree, tree_outputs
 from bt_actions.document.formatting.format import format_source
-from bt_actions.document.language.kinds import KINDS
+from bt_actions.document.kinds import KINDS
 from bt_actions.document.yaml.source import read_source
+from bt_actions.running.ticking import ChangeVisitor
 from bt_actions.testing import Script, ScriptedServer, Simulation, VirtualNetwork, VirtualRunner
 
 ROOT = Path(__file__).parents[2]
@@ -134,6 +136,26 @@ def test_the_example_of_a_kind_ends_as_it_should(
             around.run(root, timeout=0.5)
     else:
         assert around.run(root) is ENDS[kind]
+
+
+def test_a_behaviour_is_called_as_its_kind(node: Node) -> None:
+    called = {name: in_words(node(kind.example)).partition(",")[0] for name, kind in KINDS.items()}
+    assert called == {**{name: name for name in KINDS}, "python": "Periodic"}
+
+
+def test_what_looks_at_nothing_but_its_children_or_its_goal_costs_no_ticks(node: Node) -> None:
+    def watches(root: Behaviour) -> bool:
+        visitor = ChangeVisitor(lambda: None, lambda: "")
+        root.status = Status.RUNNING
+        visitor.run(root)
+        visitor.finish()
+        return visitor.watching
+
+    watching = {name for name, kind in KINDS.items() if watches(node(kind.example))}
+    assert KINDS.keys() - watching == {
+        *("sequence", "fallback", "parallel", "retry", "repeat", "for_each", "subtree"),
+        *("invert", "force_success", "force_failure", "run_once", "action", "run_tree"),
+    }
 
 
 @pytest.mark.parametrize("text", [ALIAS, KINDS["action"].example], ids=["alias", "action"])

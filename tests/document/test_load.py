@@ -24,18 +24,12 @@ from bt_actions.document import (
     tree_inputs,
     tree_outputs,
 )
-from bt_actions.document.building.build import BUILDERS
-from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.reading.find import TreeNotFoundError, installed_trees
 from bt_actions.goals.policy import Retry, Timeouts
 from tests.document.conftest import tick
 
 Load = Callable[..., Behaviour]
 TREES = Path(__file__).parents[2] / "trees"
-
-
-def test_each_kind_of_the_model_can_be_built() -> None:
-    assert set(BUILDERS) == set(KINDS)
 
 
 def test_the_demo_tree_becomes_plain_py_trees_behaviours() -> None:

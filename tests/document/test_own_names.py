@@ -20,8 +20,8 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from bt_actions.document import DocumentError
+from bt_actions.document.kinds import KINDS
 from bt_actions.document.language.keys import NODE, NODES, TOP_KEYS
-from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.scalars import Condition, Duration, Place, Shape, Text
 from bt_actions.document.language.shapes import Key, ListOf, ListValue, OneOf, Record, Table, Values
 from bt_actions.document.language.values import computed_in

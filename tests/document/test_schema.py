@@ -13,10 +13,10 @@ import pytest
 from bt_actions.cli import main
 from bt_actions.document import check_file
 from bt_actions.document.findings.rules import RULES
+from bt_actions.document.kinds import KINDS
 from bt_actions.document.language.keys import ALIAS, INPUT, OUTPUT, TOP_KEYS, TOPIC
-from bt_actions.document.language.kinds import KINDS
-from bt_actions.document.language.schema import json_schema
 from bt_actions.document.language.shapes import required_in
+from bt_actions.document.schema import json_schema
 from bt_actions.document.yaml.compose import compose
 from bt_actions.document.yaml.nodes import Listing, Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source

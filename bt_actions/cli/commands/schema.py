@@ -34,7 +34,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the schema."""
-    from bt_actions.document.language.schema import json_schema
+    from bt_actions.document.schema import json_schema
 
     del args
     write(json.dumps(json_schema(), indent=2, ensure_ascii=False) + "\n")

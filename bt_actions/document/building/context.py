@@ -25,7 +25,7 @@ from bt_actions.document.language.classes import Python
 from bt_actions.document.language.types import parse_type
 from bt_actions.document.language.values import Computed, refuse_large, resolve
 from bt_actions.document.reading.inputs import convert
-from bt_actions.document.reading.tree import Document, TreeNode, join_names, text_of
+from bt_actions.document.reading.tree import Document, TreeNode, join_names, table_of, text_of
 from bt_actions.document.yaml.nodes import Scalar
 from bt_actions.expressions.expression import Expression
 from bt_actions.messages import fields
@@ -164,6 +164,10 @@ class Context:
         except ValueError as error:
             raise ValueError(f"{name}: {error}") from None
 
+    def named(self, node: TreeNode, words: str, about: str | None = None) -> str:
+        """A node's name, or `words`, in which what is written stands for `{}`, or `about` does."""
+        return node.name or plain_name(words.format(written_text(node) if about is None else about))
+
     def name(self, values: Mapping[str, object], key: str) -> str:
         """A ROS name in the namespaces that hold here."""
         return self.joined(values, text_of(values, key))
@@ -235,11 +239,6 @@ def _numbers(
         return None
     fits = declared is None or parse_type(declared) == kind
     return attrgetter(".".join(path)) if fits else None
-
-
-def table_of(value: object) -> dict[str, Any]:
-    """A mapping as it is, and anything else as an empty one."""
-    return value if isinstance(value, dict) else {}
 
 
 def plain_name(text: str) -> str:

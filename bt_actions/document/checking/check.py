@@ -1,8 +1,8 @@
 """The checks of names and types, in their order: what the form alone cannot tell.
 
-Those of single kinds are in `kinds.py`, those of single values in `checker.py`. What is written in
-another file is told there where it is wrong by itself, and at the import where it is wrong in this
-tree only.
+Those of single kinds are in `document/kinds/`, those of single values in `checker.py`. What is
+written in another file is told there where it is wrong by itself, and at the import where it is
+wrong in this tree only.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from bt_actions.document.checking.checker import Checker
-from bt_actions.document.checking.kinds import CHECKS
 from bt_actions.document.checking.names import check_names
+from bt_actions.document.checking.value_types import FLOAT, INTEGER
 from bt_actions.document.findings import Related
+from bt_actions.document.language.scalars import Duration, Whole
 from bt_actions.document.language.types import TypeNameError, parse_type
 from bt_actions.document.language.values import (
     BAD,
@@ -37,12 +38,28 @@ def check_document(checker: Checker) -> None:
     _check_actions(checker)
     for node in checker.document.nodes():
         checker.reader = node
-        if node.kind.name in CHECKS:
-            CHECKS[node.kind.name](checker, node)
+        _check_form(checker, node)
+        if node.kind.check is not None:
+            node.kind.check(checker, node)
         if node.alias is not None:
             _check_together(checker, node)
     _check_defaults(checker)
     check_names(checker)
+
+
+def _check_form(checker: Checker, node: TreeNode) -> None:
+    """Check what the forms of a kind's keys tell of it: condition, number, what it talks over."""
+    kind = node.kind
+    form = kind.keys[kind.reads].shape if kind.reads in kind.keys else kind.value
+    value = node.values.get(kind.reads)
+    if kind.interface is not None:
+        checker.call(node.values, node.written, checker.class_of(node), kind.interface)
+    elif kind.asks:
+        checker.condition(value, {})
+    elif isinstance(value, Computed) and isinstance(form, Whole):
+        checker.number(value, INTEGER, form.least)
+    elif isinstance(value, Computed) and isinstance(form, Duration):
+        checker.number(value, FLOAT, 0, zero=form.zero)
 
 
 def _check_declarations(checker: Checker) -> None:

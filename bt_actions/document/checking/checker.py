@@ -10,7 +10,6 @@ from collections import defaultdict
 from collections.abc import Callable, Container
 from collections.abc import Mapping as MappingType
 from functools import lru_cache
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from bt_actions.document.checking.infer import Wrong, infer
@@ -26,7 +25,7 @@ from bt_actions.document.checking.value_types import (
 )
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.findings.elsewhere import notation_here
-from bt_actions.document.language.kinds import KINDS, Interface, Kind
+from bt_actions.document.language.kinds import ACTION, Interface
 from bt_actions.document.language.types import (
     Either,
     TypeNameError,
@@ -54,7 +53,7 @@ from bt_actions.expressions.expression import Expression
 from bt_actions.expressions.text import ExpressionError
 from bt_actions.messages.conversion import ANGLE, examine
 from bt_actions.messages.fields import FieldType, Listing, Message, describe
-from bt_actions.messages.interfaces import DURATION, RUN_TREE, interface_name
+from bt_actions.messages.interfaces import DURATION, interface_name
 from bt_actions.utilities.suggest import closest, listing
 
 if TYPE_CHECKING:
@@ -66,11 +65,11 @@ Types = MappingType[str, FieldType | None]
 @lru_cache(maxsize=1024)
 def _parts(cls: type | None, interface: Interface) -> tuple[FieldType | None, Types]:
     """The type of what is sent, and the root of expressions over what comes back."""
+    more: Types = dict.fromkeys(interface.more)
     if cls is None:
-        return None, {interface.root: None}
-    return Message(interface.part(cls, interface.sent)), {
-        interface.root: Message(interface.part(cls, interface.received))
-    }
+        return None, {interface.root: None, **more}
+    received = Message(interface.part(cls, interface.received))
+    return Message(interface.part(cls, interface.sent)), {interface.root: received, **more}
 
 
 def _all_computed(
@@ -191,10 +190,11 @@ class Checker:
         """The class of the interface that a node talks over, or None after reporting."""
         if node.alias is not None:
             return self.action_class(self.document.actions[node.alias])
-        name = RUN_TREE if node.kind.name == "run_tree" else node.values.get("type")
-        if node.kind.interface is None or not isinstance(name, str):
+        interface = node.kind.interface
+        name = interface and (interface.type or node.values.get("type"))
+        if interface is None or not isinstance(name, str):
             return None
-        return self.interface(name, node.kind.interface.kind, node.written.get("type", node.key))
+        return self.interface(name, interface.kind, node.written.get("type", node.key))
 
     def received(self, node: TreeNode) -> FieldType | None:
         """The type of what comes back to a node: a result, an answer, a message."""
@@ -216,7 +216,7 @@ class Checker:
     def _type_of(self, write: Write) -> FieldType | None:
         """The type of what is written, without reporting anything."""
         node, value = write.node, write.value
-        if node.kind.name == "subtree":
+        if node.kind.includes:
             outputs = node.included.outputs if node.included is not None else {}
             return self.declared_type(outputs.get(str(value)))
         if write.root == "item of" and isinstance(value, list):
@@ -236,14 +236,11 @@ class Checker:
         values: MappingType[str, object],
         written: MappingType[str, Node],
         cls: type | None,
-        kind: Kind = KINDS["action"],
-        more: Types = MappingProxyType({}),
+        interface: Interface = ACTION,
     ) -> None:
-        """Check what all kinds with an interface have in common; `more` are further roots."""
-        assert kind.interface is not None
-        key = kind.interface.fields
-        asked, roots = _parts(cls, kind.interface)
-        roots = {**roots, **more} if more else roots
+        """Check what all kinds with an interface have in common."""
+        key = interface.fields
+        asked, roots = _parts(cls, interface)
         if key in values and key in written:
             self.value(asked, values[key], written[key])
         self.condition(values.get("expect", values.get("until")), roots)
@@ -362,6 +359,21 @@ class Checker:
         if kind is not None and kind != BOOL:
             text = f"a condition is true or false, and this is {named(kind)}"
             self.source.report("BT206", span_of(value.node), text)
+
+    def number(
+        self, value: Computed, wanted: FieldType, least: float, *, zero: bool = True
+    ) -> None:
+        """Check an expression that must be a number, of at least `least`."""
+        given = self.expression(value, {})
+        number = constant_of(value)
+        if not fits(given, wanted):
+            text = f"{named(wanted)} is needed, and this is {named(given)}"
+            self.source.report("BT204", span_of(value.node), text)
+        elif isinstance(number, (int, float)) and not least <= number < float("inf"):
+            text = f"at least {least:g} is needed, not {number}"
+            self.source.report("BT110", span_of(value.node), text)
+        elif number == 0 and not zero:
+            self.source.report("BT110", span_of(value.node), "more than zero is needed, not 0")
 
     def expression(self, computed: Computed, roots: Types) -> FieldType | None:
         """Check what an expression reads and does; return its type, or None."""

@@ -1,6 +1,7 @@
 """Hazards: what is allowed, and likely to go wrong on a robot. Each is a warning with a code.
 
-Looks at one checked document (and at what it includes, where a hazard spans both).
+Looks at one checked document (and at what it includes, where a hazard spans both). The hazards of
+single kinds are in `document/kinds/`.
 """
 
 from __future__ import annotations
@@ -10,42 +11,40 @@ from collections.abc import Iterator, Mapping
 
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.reads import find_early_reads, find_missing
-from bt_actions.document.checking.verdicts import BEGUN, Verdicts
+from bt_actions.document.checking.verdicts import Verdicts
 from bt_actions.document.findings import Related
-from bt_actions.document.language.values import names_value
+from bt_actions.document.language.kinds import Can, End, Group
 from bt_actions.document.reading.tree import (
     Declared,
     Document,
     TreeNode,
-    resources_below,
     shared_settings,
 )
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import Mapping as YamlMapping
 from bt_actions.document.yaml.nodes import Node, span_of
 
-_BUSY = BEGUN | {"wait_until", "running", "python", "retry", "repeat", "for_each"}
-_LOOPED = ("as", "index")
-"""What a loop writes for those who want to read it."""
-
 
 def find_hazards(checker: Checker) -> None:
     """Report the hazards of a document that was checked, but for those that are not certain."""
     checker.doubts = Doubts(checker.document)  # anew: the checker found more
     if checker.document.root is not None:
-        _Hazards(checker).look(checker.document.root)
+        Hazards(checker).look(checker.document.root)
 
 
-class _Hazards:
+class Hazards:
+    """What is known of a document that is looked at, also to the kinds of its nodes."""
+
     def __init__(self, checker: Checker) -> None:
-        self._checker = checker
-        self._doubts = checker.doubts
-        self._document: Document = checker.document
-        self._source = checker.source
+        self.checker = checker
+        self.doubts = checker.doubts
+        self.document: Document = checker.document
+        self.source = checker.source
         self._report = checker.source.report
-        self._verdicts = Verdicts()
+        self.verdicts = Verdicts()
         self._at_once = Verdicts(at_once=True)
-        self._held: dict[tuple[int, str], dict[str, TreeNode]] = {}
+        self.held: dict[tuple[int, str], dict[str, TreeNode]] = {}
+        """What trees that are included hold (`resources_below`)."""
         self._slow: dict[int, bool] = {}
         self._anew: dict[int, TreeNode | None] = {}
         names = (None, *checker.document.actions)
@@ -57,8 +56,8 @@ class _Hazards:
     def look(self, root: TreeNode) -> None:
         self._walk(root, bounded=False)
         self._result_timeouts()
-        find_early_reads(self._checker, root)
-        find_missing(self._checker, root)
+        find_early_reads(self.checker, root)
+        find_missing(self.checker, root)
         self._unused()
 
     def _walk(self, root: TreeNode, *, bounded: bool) -> None:
@@ -66,46 +65,31 @@ class _Hazards:
         stack = [(root, bounded, loops)]
         while stack:
             node, inside, around = stack.pop()
-            kind = node.kind.name
+            kind = node.kind
             if node.alias is not None:
                 self._used.add(node.alias)
             if node.is_action and not inside:
                 self._look_at_action(node)
             if not node.children:
                 continue
-            if kind == "parallel":
-                self._parallel(node)
-            elif kind == "retry" and not inside:
-                self._retry(node)
-            elif kind in ("sequence", "fallback"):
-                self._unreachable(node, kind)
+            if kind.warn is not None:
+                kind.warn(self, node, inside)
+            if kind.in_turn is not None:
+                self._unreachable(node, kind.in_turn)
                 if node.values.get("memory") is False:
-                    self._reactive(node, kind)
-            elif kind == "invert":
-                self._inverted(node)
-            elif kind == "timeout":
-                self._short(node)
-                inside = True
-            elif kind == "for_each":
+                    self._reactive(node, kind.in_turn)
+            if writes := self.checker.writes.get(id(node), ()):
                 self._taken(node, around)
-                around = around | {
-                    write.name: node for write in self._checker.writes.get(id(node), ())
-                }
+                around = around | {write.name: node for write in writes}
+            inside = inside or kind.bounds
             stack += [(child, inside, around) for child in reversed(node.children)]
-
-    # BT304
-
-    def _retry(self, node: TreeNode) -> None:
-        if "attempts" not in node.values and not self._doubts.own(node):
-            hint = "attempts: N, or a 'timeout' around it"
-            self._report("BT304", span_of(node.key), "this retry never gives up", hint=hint)
 
     # BT301
 
     def _look_at_action(self, node: TreeNode) -> None:
         if node.alias in self._bounded or _bounds(node.values):
             return
-        if self._doubts.below(node):
+        if self.doubts.below(node):
             return
         if node.alias is not None:
             self._unbounded.setdefault(node.alias, node)
@@ -118,56 +102,32 @@ class _Hazards:
 
     def _result_timeouts(self) -> None:
         for name, node in self._unbounded.items():
-            declared = self._document.actions.get(name)
-            own = declared is not None and declared.source is self._source
+            declared = self.document.actions.get(name)
+            own = declared is not None and declared.source is self.source
             at = declared.key if own and declared is not None else node.key
             self._no_result_timeout(at, f"{name!r} has no result timeout: it may take for ever")
 
-    # BT303
+    # BT305, BT306
 
-    def _parallel(self, node: TreeNode) -> None:
-        taken: dict[str, TreeNode] = {}
-        for child in node.children:
-            below = resources_below(child, self._document, known=self._held)
-            for resource, user in below.items():
-                first = taken.get(resource.lstrip("/"))
-                if first is None or self._doubts.below(node):
-                    continue
-                place = first.place
-                where = user if user.source is self._source else child
-                self._report(
-                    "BT303", span_of(where.key),
-                    f"this needs {resource!r}, and so does a branch beside it: only one can run",
-                    related=Related(place, "the other is here"),
-                    hint="busy: share, where both may run at once",
-                )  # fmt: skip
-                break
-            for resource, user in below.items():
-                taken.setdefault(resource.lstrip("/"), user)
-
-    # BT305, BT306, BT307
-
-    def _unreachable(self, node: TreeNode, kind: str) -> None:
-        onward = 0 if kind == "sequence" else 1
+    def _unreachable(self, node: TreeNode, onward: End) -> None:
         for child, after in zip(node.children, node.children[1:], strict=False):
-            if not self._verdicts.of(child)[onward] and not self._doubts.below(child):
-                how = "fails" if kind == "fallback" else "succeeds"
+            if not _can(self.verdicts.of(child), onward) and not self.doubts.below(child):
+                how = "fails" if onward is End.FAILURE else "succeeds"
                 self._report(
                     "BT305", span_of(after.key), "this child is never reached",
                     related=Related(child.place, f"this one never {how}"),
                 )  # fmt: skip
                 return
 
-    def _reactive(self, node: TreeNode, kind: str) -> None:
+    def _reactive(self, node: TreeNode, onward: End) -> None:
         slow = (self._takes_time(child) for child in node.children)
         last = max((at for at, takes in enumerate(slow) if takes), default=0)
-        onward = 0 if kind == "sequence" else 1  # the end after which the next child is ticked
         begun_anew = [
             self._restarted(child) or child
             for child in node.children[:last]
-            if self._verdicts.of(child)[onward] and not self._at_once.of(child)[onward]
+            if _can(self.verdicts.of(child), onward) and not _can(self._at_once.of(child), onward)
         ]
-        if not begun_anew or self._doubts.below(node):
+        if not begun_anew or self.doubts.below(node):
             return
         for begun in begun_anew:
             self._report(
@@ -185,10 +145,9 @@ class _Hazards:
         while stack and found is None:
             node = stack.pop()
             inner = node.included.root if node.included is not None else None
-            anew = node.is_action or node.kind.name in BEGUN
-            if anew or (inner is not None and self._restarted(inner)):
+            if node.kind.begun or (inner is not None and self._restarted(inner)):
                 found = node
-            elif node.kind.name != "run_once":
+            elif not node.kind.once:
                 stack.extend(reversed(node.children))
         self._anew[id(root)] = found
         return found
@@ -199,57 +158,18 @@ class _Hazards:
         if found is None:
             below = node.included.root if node.included is not None else None
             within = [*node.children, below] if below is not None else node.children
-            busy = node.is_action or node.kind.name in _BUSY
-            busy = busy or "subscribers" in node.values  # of a publish, which waits for them
+            slow = node.kind.begun or node.kind.slow
+            busy = slow in node.values if isinstance(slow, str) else slow
             found = busy or any(self._takes_time(each) for each in within)
             self._slow[id(node)] = found
         return found
 
-    def _short(self, node: TreeNode) -> None:
-        after = node.values.get("after")
-        if not isinstance(after, float) or not node.children or self._doubts.below(node):
-            return
-        needed = self._verdicts.budget(node.children[0], self._document)
-        if after < needed:
-            self._report(
-                "BT307", span_of(node.written["after"]),
-                f"{after:g} s are less than the {needed:g} s that what it holds may take",
-                hint="the deadlines and retries inside would never be reached",
-            )  # fmt: skip
-
-    # BT314
-
-    def _inverted(self, node: TreeNode) -> None:
-        """A check fails where nothing has come on its topic; that is a success here."""
-        asked = [inner for child in node.children for inner in child.walk()]
-        kinds = {inner.kind.name for inner in asked}
-        if not kinds <= {"sequence", "fallback", "check"}:
-            return
-        reads = (read for inner in asked for read in self._checker.reads.get(id(inner), ()))
-        of_topics = (
-            (name, read)
-            for read in reads
-            for name in read.expression.variables
-            if name in self._document.topics and name not in read.expression.asked
-        )
-        topic, first = next(of_topics, ("", None))
-        if first is None or self._doubts.below(node):
-            return
-        hint = "write 'not' in the check itself, which fails while it has no value"
-        if asked[0].values.get("check") is first:
-            text = first.expression.text.strip()
-            hint = f"check: not {text if names_value(text) else f'({text})'}"
-        self._report(
-            "BT314", span_of(node.key), f"this succeeds, too, while nobody knows ${topic}",
-            hint=hint,
-        )  # fmt: skip
-
     # BT312
 
     def _taken(self, node: TreeNode, around: Mapping[str, TreeNode]) -> None:
-        document = self._document
+        document = self.document
         given: dict[str, TreeNode | Declared] = {**document.inputs, **document.topics, **around}
-        for write in self._checker.writes.get(id(node), ()):
+        for write in self.checker.writes.get(id(node), ()):
             other = given.get(write.name)
             if other is not None:
                 self._report(
@@ -262,7 +182,7 @@ class _Hazards:
     # BT308 to BT311
 
     def _unused(self) -> None:
-        checker, document, doubts = self._checker, self._document, self._doubts
+        checker, document, doubts = self.checker, self.document, self.doubts
         reads = itertools.chain.from_iterable(checker.reads.values())
         read = {name for one in reads for name in one.expression.variables}
         written = {write.name for writes in checker.writes.values() for write in writes}
@@ -279,7 +199,7 @@ class _Hazards:
                 self._report("BT311", span_of(declared.key), text)
 
     def _unread(self, read: set[str], written: set[str]) -> None:
-        document, doubts = self._document, self._doubts
+        document, doubts = self.document, self.doubts
         for name, declared in document.inputs.items():
             if name not in read and name not in document.outputs and not doubts.mentions(name):
                 self._report("BT308", span_of(declared.key), f"nothing reads the input {name!r}")
@@ -288,8 +208,10 @@ class _Hazards:
                 key = document.topics[name].key
                 self._report("BT309", span_of(key), f"nothing reads the topic {name!r}")
         known = read | set(document.outputs) | set(document.inputs) | set(document.topics)
-        for writes in self._checker.writes.values() if written - known else ():
-            unread = [one for one in writes if one.name not in known and one.under not in _LOOPED]
+        for writes in self.checker.writes.values() if written - known else ():
+            unread = [
+                one for one in writes if one.name not in known and one.node.kind.group is Group.LEAF
+            ]
             if not unread:
                 continue
             node = unread[0].node
@@ -301,7 +223,11 @@ class _Hazards:
                 self._report("BT310", span_of(keys.get(name, node.key)), f"nothing reads ${name}")
 
     def _own(self, table: dict[str, Declared]) -> Iterator[str]:
-        return (name for name, declared in table.items() if declared.source is self._source)
+        return (name for name, declared in table.items() if declared.source is self.source)
+
+
+def _can(can: Can, end: End) -> bool:
+    return can.fail if end is End.FAILURE else can.succeed
 
 
 def _bounds(settings: Mapping[str, object]) -> bool:

@@ -23,7 +23,6 @@ from bt_actions.document.reading.tree import (
     text_of,
 )
 from bt_actions.document.yaml.nodes import Node, span_of
-from bt_actions.messages.interfaces import RUN_TREE
 
 _WORDS = {"action": "the action server", "srv": "the service", "msg": "the topic"}
 _TOPIC = Interface("msg", "topic")
@@ -82,12 +81,12 @@ def _uses(document: Document, known: _Known) -> Iterator[tuple[_Name, _Use]]:
             settings = {**shared_settings(node.alias, document), **node.values}
             at = _place(document.actions[node.alias], document, node.key)
             yield from _use(interface, settings, at, document)
-        elif node.kind.name == "run_tree":
-            values = {"type": RUN_TREE, "server": server_of(node.values), "namespace": namespace}
-            yield from _use(interface, values, (node.place, node.key), document)
         else:
+            values = node.values
+            if interface.type:
+                values = {**values, "type": interface.type, "server": server_of(values)}
             at = node.place, node.written.get("type", node.key)
-            yield from _use(interface, node.values, at, document)
+            yield from _use(interface, values, at, document)
 
 
 def _place(declared: Declared, document: Document, used: Node) -> tuple[Place, Node]:

@@ -21,24 +21,14 @@ from typing import NamedTuple
 
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.findings import Related, Span
+from bt_actions.document.language.kinds import End, Kind
 from bt_actions.document.language.values import Computed, computed_in
 from bt_actions.document.reading.tree import TreeNode, settings_of
 from bt_actions.document.yaml.nodes import span_of
 
 _NOTHING: frozenset[str] = frozenset()
-_LOOPS = frozenset({"retry", "repeat", "for_each", "while", "parallel"})
-_STRAIGHT = frozenset({"sequence", "timeout", "while", "run_once"})
-"""Go on when a child succeeds, and fail with it."""
-_TURNED = frozenset({"fallback", "invert"})
-"""Go on when a child fails. Of all other kinds nothing is known."""
-_ASKS = frozenset({"check", "while"})
-_AT_ONCE = _ASKS | {"set", "publish"}
-"""Kinds that fail for a missing value, and for hardly anything else."""
-_CONDITIONS = frozenset({"sequence", "fallback", "check", "wait_until", "timeout"})
-_DOES_WITHOUT = frozenset({"invert", "force_success"})
-"""Kinds that succeed where their child has failed."""
-
-
+_DOES_WITHOUT = (End.FAILURE, End.ANY)
+"""The ends of its child that a decorator succeeds after where the child's failure is none."""
 _Written = tuple[Set[str], Set[str]]
 """Names that may have been written below a node when it has succeeded, and when it has failed.
 
@@ -85,14 +75,14 @@ class _Order:
             self._passed |= own
         elif not node.children:
             return _SILENT
-        kind = node.kind.name
+        kind = node.kind
         if not node.children:
-            return own, own if kind == "subtree" else _NOTHING
-        if kind == "repeat":  # a read in its first round has nothing yet
+            return own, own if kind.includes else _NOTHING
+        if kind.again is End.SUCCESS:  # a read in its first round has nothing yet
             later |= self._below(node)
-        elif kind in _LOOPS or node.values.get("memory") is False:
+        elif kind.again is not None or node.values.get("memory") is False:
             around |= self._below(node)
-        if kind not in ("repeat", "sequence"):  # who may go on after a read that failed
+        if End.SUCCESS not in (kind.again, kind.in_turn):  # may go on after a read that failed
             around |= later
         if not own:
             return self._children(node, kind, around, later)
@@ -103,7 +93,7 @@ class _Order:
         return succeeded | own, failed | own
 
     def _children(
-        self, node: TreeNode, kind: str, around: frozenset[str], later: frozenset[str]
+        self, node: TreeNode, kind: Kind, around: frozenset[str], later: frozenset[str]
     ) -> _Written:
         added: set[str] = set()
         onward: set[str] = set()  # written when the next child is reached, or there is none left
@@ -115,9 +105,9 @@ class _Order:
             succeeded, failed = self.visit(child, around, later)
             if not (succeeded or failed):
                 continue
-            if kind in _TURNED:
+            if kind.goes_on is End.FAILURE:
                 succeeded, failed = failed, succeeded
-            elif kind not in _STRAIGHT:
+            elif kind.goes_on is not End.SUCCESS:
                 succeeded = failed = succeeded | failed
             ended |= failed
             if succeeded:
@@ -125,7 +115,7 @@ class _Order:
                 added |= succeeded - self._known
                 self._known |= succeeded
         self._known -= added
-        return (ended, onward) if kind == "fallback" else (onward, ended)
+        return (ended, onward) if kind.in_turn is End.FAILURE else (onward, ended)
 
     def _below(self, node: TreeNode) -> frozenset[str]:
         return _NOTHING.union(*map(self._checker.written_by, node.walk()))
@@ -170,7 +160,11 @@ class _Need(NamedTuple):
 
     @property
     def asks(self) -> bool:
-        return self.node.kind.name in _ASKS
+        return self.node.kind.asks and not self.node.kind.slow
+
+    @property
+    def waits(self) -> bool:
+        return self.node.kind.asks and bool(self.node.kind.slow)
 
 
 _Needs = tuple[tuple[_Need, ...], frozenset[str]]
@@ -179,7 +173,7 @@ _Needs = tuple[tuple[_Need, ...], frozenset[str]]
 
 def find_missing(checker: Checker, root: TreeNode) -> None:
     """Report the reads in later children of fallbacks that fail for what an earlier one lacked."""
-    if any(node.kind.name == "fallback" for node in checker.document.nodes()):
+    if any(node.kind.in_turn is End.FAILURE for node in checker.document.nodes()):
         _Missing(checker).visit(root)
 
 
@@ -195,13 +189,13 @@ class _Missing:
 
     def visit(self, node: TreeNode) -> None:
         """Look at a node and what is below it."""
-        if node.kind.name == "fallback" and not self._doubts.below(node):
+        if node.kind.in_turn is End.FAILURE and not self._doubts.below(node):
             self._look_at(node)
         self._written |= self._checker.written_by(node)
         added: set[str] = set()
         for child in node.children:
             self.visit(child)
-            if node.kind.name == "sequence":
+            if node.kind.in_turn is End.SUCCESS:
                 given = self._needs(child)[1] - self._there
                 added |= given
                 self._there |= given
@@ -216,13 +210,13 @@ class _Missing:
             last = child is fallback.children[-1]
             for need in needs:
                 first, rescued = lacked.get(need.name, (None, False))
-                if first is None or need.name in settled or need.node.kind.name == "wait_until":
+                if first is None or need.name in settled or need.waits:
                     continue
                 if not need.asks or (rescued and not asks and last):
                     settled.add(need.name)
                     self._report(need, first)
             for need in needs:
-                if need.node.kind.name in _AT_ONCE or id(need.node) in waits:
+                if need.asks or need.node.kind.computes or id(need.node) in waits:
                     lacked.setdefault(need.name, (need, asks))
             for each in child.walk():
                 settled.update(*(one.expression.asked for one in computed_in(each.values)))
@@ -244,16 +238,17 @@ class _Missing:
     def _work_out(self, node: TreeNode) -> _Needs:
         needs = [*self._own(node)]
         there = {*self._checker.written_by(node), *(need.name for need in needs)}
-        kind = node.kind.name
-        if kind in ("check", "wait_until"):
-            there.update(*(one.expression.variables for one in computed_in(node.values.get(kind))))
+        kind = node.kind
+        if kind.only_asks:
+            asked = computed_in(node.values.get(kind.name))
+            there.update(*(one.expression.variables for one in asked))
         inner = [self._needs(child) for child in node.children]
-        if kind == "fallback" and inner:
+        if kind.in_turn is End.FAILURE and inner:
             in_all = [{need.name for need in each} for each, _ in inner]
             last, _ = inner[-1]
             needs += [need for need in last if all(need.name in names for names in in_all)]
             there |= frozenset.intersection(*(given for _, given in inner))
-        elif kind not in _DOES_WITHOUT and (kind != "parallel" or "policy" not in node.values):
+        elif (kind.in_turn or kind.goes_on not in _DOES_WITHOUT) and "policy" not in node.values:
             for each, given in inner:
                 needs += [need for need in each if need.name not in there]
                 there |= given
@@ -284,12 +279,13 @@ def _ended_waits(branch: TreeNode) -> set[int]:
     waiting = [(branch, False)]
     while waiting:
         node, ends = waiting.pop()
-        ends = ends or node.kind.name == "timeout"
-        if node.kind.name == "wait_until" and (ends or "timeout" in node.values):
+        ends = ends or node.kind.bounds
+        if node.kind.only_asks and node.kind.slow and (ends or "timeout" in node.values):
             found.add(id(node))
         waiting += [(child, ends) for child in node.children]
     return found
 
 
 def _only_asks(node: TreeNode) -> bool:
-    return {each.kind.name for each in node.walk()} <= _CONDITIONS
+    kinds = {each.kind for each in node.walk()}
+    return all(kind.only_asks or kind.in_turn or kind.bounds for kind in kinds)

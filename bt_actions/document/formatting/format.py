@@ -16,8 +16,8 @@ from collections.abc import Container, Iterable, Iterator
 from collections.abc import Mapping as MappingType
 
 from bt_actions.document.findings import DocumentError, Span
+from bt_actions.document.kinds import KINDS
 from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES, TOP_KEYS
-from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.language.scalars import Shape
 from bt_actions.document.language.shapes import Key, ListOf, OneOf, Record, Table
 from bt_actions.document.yaml.compose import compose, compose_written
@@ -391,7 +391,7 @@ def _node_shapes(names: list[str]) -> MappingType[str, Shape | None]:
     """The keys of a node: its kind or its action first, what it holds last."""
     kinds = [name for name in names if name in KINDS]
     if "child" not in names:  # settings of an action, then
-        kinds = [name for name in kinds if name not in ("timeout", "retry")]
+        kinds = [name for name in kinds if name not in ACTION_KEYS]
     foreign = [name for name in names if name not in ACTION_KEYS]
     if len(kinds) == 1:
         kind = KINDS[kinds[0]]

@@ -1,7 +1,7 @@
 """The keys of trees: at the top, beside actions, topics, inputs and outputs, each with its form.
 
-Which kinds of nodes there are is said in `kinds.py`. Reading, checking, the JSON Schema and the
-reference (docs/yaml.md) are all made from these two.
+Which kinds of nodes there are is said in `document/kinds/`. Reading, checking, the JSON Schema and
+the reference (docs/yaml.md) are all made from these two.
 """
 
 from __future__ import annotations
@@ -62,6 +62,14 @@ RETRY = Record(
     "a number of attempts or a mapping",
     keyed(*_TRIES, Key("outcomes", _OUTCOMES, "After which outcomes to try again."), _WHEN),
     short="attempts",
+)
+SERVICE_TIMEOUT = Record(
+    "a duration or a mapping of deadlines",
+    keyed(
+        Key("server", Duration(or_none=True), "For the service to be there.", default="5 s"),
+        Key("response", Duration(or_none=True), "For the answer.", default="5 s"),
+    ),
+    short="response",
 )
 SERVICE_RETRY = Record("a number of attempts or a mapping", keyed(*_TRIES, _WHEN), short="attempts")
 NAMESPACE = RosName("a namespace", namespace=True)

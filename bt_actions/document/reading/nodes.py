@@ -12,14 +12,9 @@ from itertools import chain
 from bt_actions.document.findings import Place, Related
 from bt_actions.document.findings.elsewhere import key_here, kind_here
 from bt_actions.document.language.keys import ACTION_KEYS
-from bt_actions.document.language.kinds import KINDS, Group, Interface
+from bt_actions.document.language.kinds import KINDS, NODE_KEYS, Group, Interface
 from bt_actions.document.language.scalars import Name, is_computed, words_for, wrong_form
-from bt_actions.document.language.shapes import (
-    Key,
-    Table,
-    report_unknown_key,
-    required_in,
-)
+from bt_actions.document.language.shapes import Key, Table, report_unknown_key
 from bt_actions.document.language.types import interface_of
 from bt_actions.document.language.values import BAD
 from bt_actions.document.reading.tree import Document, TreeNode
@@ -36,21 +31,11 @@ from bt_actions.document.yaml.nodes import (
 from bt_actions.messages.as_fields import as_fields
 from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
 
-_ACTION = KINDS["action"]
 _CHILDREN = ("child", "children")
-_NEEDS = {kind.name: required_in(kind.keys) for kind in KINDS.values()}
-"""The keys that must be there."""
-NODE_KEYS = frozenset(
-    {*ACTION_KEYS, *_CHILDREN, *(key for kind in KINDS.values() for key in kind.keys)}
-)
-"""All that may stand in a node beside its kind."""
 _BESIDE_CHILD = frozenset({"timeout", "retry"})
 """Kinds only beside `child:`; settings of an action elsewhere."""
 _BESIDE_TYPE = frozenset({"action", *_BESIDE_CHILD})
 """Kinds that are taken for keys in a node whose kind stands behind 'type:'."""
-_DECORATORS = {kind.name: kind.name for kind in KINDS.values() if kind.group is Group.DECORATOR}
-_DECORATORS |= {key: name for name in _DECORATORS for key in KINDS[name].keys if key != "name"}
-"""Which kind a decorator's name, or a key of one, is written for."""
 _LONGEST = 40
 _SIGNS = frozenset(":,{}[]#\n")
 _IN_SEQUENCE = "put a sequence there, and the list into it: {sequence: name, children: [...]}"
@@ -120,7 +105,7 @@ class _Reader:
             node = TreeNode(kind, key, written, source)
             self._fill(node, kind.keys)
         else:
-            node = TreeNode(_ACTION, key, written, source, alias=key.text)
+            node = TreeNode(KINDS["action"], key, written, source, alias=key.text)
             self._fill(node, ACTION_KEYS)
         return node
 
@@ -216,7 +201,9 @@ class _Reader:
         for name in _CHILDREN:
             inner = written.get(name)
             if inner is not None:
-                self._children(TreeNode(_ACTION, Scalar(), written, self._source), name, inner)
+                self._children(
+                    TreeNode(KINDS["action"], Scalar(), written, self._source), name, inner
+                )
 
     def _fill(self, node: TreeNode, keys: MappingType[str, Key]) -> None:
         source, values, written = self._source, node.values, node.written
@@ -248,7 +235,8 @@ class _Reader:
                     self._report_unknown(node, key, keys)
                     source.unread.nodes += (key, inner)
                     if name in _CHILDREN:
-                        self._children(TreeNode(_ACTION, key, node.node, source), name, inner)
+                        astray = TreeNode(KINDS["action"], key, node.node, source)
+                        self._children(astray, name, inner)
                     continue
                 written[name] = inner
                 if isinstance(inner, Listing) and interface and name == interface.fields:
@@ -265,7 +253,7 @@ class _Reader:
             node.name = own
         if unknown:
             return
-        needs = _NEEDS[kind.name] if node.alias is None else ()
+        needs = kind.needs if node.alias is None else ()
         missing = [key for key in needs if key.name not in written and key.name not in self._astray]
         if missing and node.is_action and node.name in self._actions:
             said = f"{node.name!r} is an action of this tree: its name is the node's kind"
@@ -367,8 +355,11 @@ class _Reader:
 
 def _decorator_of(word: str, keys: MappingType[str, Key]) -> str | None:
     """The decorator that an unknown key is likely to be meant for."""
-    if word in _DECORATORS or closest(word, keys) or any(key_here(word, keys)):
-        return _DECORATORS.get(word)
+    names = [kind.name for kind in KINDS.values() if kind.group is Group.DECORATOR]
+    meant = {key: name for name in names for key in KINDS[name].keys if key != "name"}
+    meant |= {name: name for name in names}
+    if word in meant or closest(word, keys) or any(key_here(word, keys)):
+        return meant.get(word)
     return closest(word, (*_BESIDE_CHILD, "repeat"))
 
 
@@ -378,12 +369,13 @@ def _around(written: Mapping, outer: Scalar, inner: Scalar, decorator: str = "")
     `decorator` is the kind that is meant, where `outer` is one of its keys, or looks like its name.
     """
     decorator = decorator or outer.text
-    keys, setting = KINDS[decorator].keys, KINDS[decorator].reads
+    kind = KINDS[decorator]
+    keys, setting = kind.keys, kind.reads
     said = _text(written.get(decorator))
     if said == "..." and outer.text not in keys:
         said = _text(written.get(outer.text))
     name = _text(written.get(inner.text))
-    parts = [f"{decorator}: {said if decorator == 'while' else name}"]
+    parts = [f"{decorator}: {name if kind.named_by_value else said}"]
     if setting in keys:  # how often, or how long
         given = _text(written.get(setting))
         if given == "..." and said[:1].isdigit():

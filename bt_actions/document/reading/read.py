@@ -11,11 +11,10 @@ from collections.abc import Mapping as MappingType
 from bt_actions.document.findings import Span
 from bt_actions.document.findings.elsewhere import key_here
 from bt_actions.document.language.keys import DEFAULTS, LIBRARY_KEYS, TOP_KEYS
-from bt_actions.document.language.kinds import KINDS
+from bt_actions.document.language.kinds import KINDS, NODE_KEYS
 from bt_actions.document.language.scalars import words_for
 from bt_actions.document.language.shapes import Key, read_keys
 from bt_actions.document.language.values import BAD
-from bt_actions.document.reading.nodes import NODE_KEYS
 from bt_actions.document.reading.tree import Declared, Document
 from bt_actions.document.yaml.compose import compose
 from bt_actions.document.yaml.nodes import Mapping, span_of, start_of

@@ -10,9 +10,10 @@ from collections.abc import Iterator
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 from bt_actions.document.findings import Place
-from bt_actions.document.language.kinds import KINDS, Kind
+from bt_actions.document.language.kinds import Kind
 from bt_actions.document.language.values import Computed
 from bt_actions.document.yaml.nodes import Mapping, Node, Scalar
 from bt_actions.document.yaml.source import Source
@@ -42,7 +43,7 @@ class TreeNode:
     is_action: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        self.is_action = self.kind.name in ("action", "run_tree")
+        self.is_action = self.kind.is_action
 
     @property
     def place(self) -> Place:
@@ -135,13 +136,15 @@ class Document:
         return self._nodes
 
 
-_WRITERS = {"set", "for_each", *(name for name, kind in KINDS.items() if "save" in kind.keys)}
-
-
 def text_of(values: MappingType[str, object], key: str) -> str:
     """A text as it is, and anything else as an empty one."""
     value = values.get(key)
     return value if isinstance(value, str) else ""
+
+
+def table_of(value: object) -> dict[str, Any]:
+    """A mapping as it is, and anything else as an empty one."""
+    return value if isinstance(value, dict) else {}
 
 
 @lru_cache(maxsize=1024)
@@ -246,24 +249,14 @@ class Write:
 def writes_of(node: TreeNode, document: Document) -> list[Write]:
     """The variables that a node itself writes."""
     values = node.values
-    kind, interface = node.kind.name, node.kind.interface
-    if kind not in _WRITERS:
+    kind, interface = node.kind, node.kind.interface
+    if kind.writes is not None:
+        return [Write(one, node, key, value, root) for one, key, value, root in kind.writes(values)]
+    if "save" not in kind.keys:
         return []
-    saved = values.get("save")
-    own = saved if isinstance(saved, dict) else {}
     declared = document.actions.get(node.alias) if node.alias is not None else None
-    shared = declared.values.get("save") if declared is not None else None
+    own, shared = table_of(values.get("save")), table_of(declared and declared.values.get("save"))
     root = interface.root if interface is not None else None
-    writes = [Write(name, node, "save", value, root) for name, value in own.items()]
-    if isinstance(shared, dict):
-        given = [pair for pair in shared.items() if pair[0] not in own]
-        writes = [Write(name, node, "", value, "result") for name, value in given] + writes
-    if kind == "set" and isinstance(table := values.get("set"), dict):
-        writes += [Write(name, node, "set", value) for name, value in table.items()]
-    elif kind == "for_each":
-        item, index = values.get("as", "item"), values.get("index")
-        if isinstance(item, str):
-            writes.append(Write(item, node, "as", values.get("in"), "item of"))
-        if isinstance(index, str):
-            writes.append(Write(index, node, "index", 0))
-    return writes
+    given = [pair for pair in shared.items() if pair[0] not in own]
+    writes = [Write(name, node, "", value, "result") for name, value in given]
+    return writes + [Write(name, node, "save", value, root) for name, value in own.items()]

@@ -12,7 +12,6 @@ from pathlib import Path
 
 from bt_actions.document.findings import DocumentError, Finding, Related, Span
 from bt_actions.document.findings.elsewhere import package_here
-from bt_actions.document.language.kinds import KINDS
 from bt_actions.document.reading.find import TreeNotFoundError, find_tree, is_file
 from bt_actions.document.reading.nodes import read_root
 from bt_actions.document.reading.read import read_document
@@ -27,7 +26,6 @@ MAX_LEVELS = 200
 tree by recursion, and Python has 1,000 levels of that for everything."""
 _HIDDEN = "•••"
 """In place of a secret, as in events."""
-_SUBTREE = KINDS["subtree"]
 _MAX_CHAIN = 50
 _MAX_FILES = 2 * _MAX_CHAIN
 """Trees inside each other, and then files that import each other."""
@@ -123,7 +121,7 @@ class Workspace:
             size += 1
             if node.level > height:
                 height = node.level
-            if node.kind is _SUBTREE:
+            if node.kind.includes:
                 node.included = self._include(node, chain)
                 if node.included is not None:
                     size += node.included.size
@@ -142,10 +140,10 @@ class Workspace:
         return document
 
     def _include(self, node: TreeNode, chain: tuple[Path, ...]) -> Document | None:
-        wanted = node.values.get("subtree")
+        wanted = node.values.get(node.key.text)
         if not isinstance(wanted, str):
             return None
-        written = node.written["subtree"]
+        written = node.written[node.key.text]
         included = self._named(wanted, written, node.source, chain)
         if included is not None and included.node.get("root") is None:
             name = included.source.path.name if included.source.path is not None else wanted

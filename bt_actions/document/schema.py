@@ -5,8 +5,9 @@ An action's alias is the file's own word, so a node may have one key that the sc
 
 from __future__ import annotations
 
+from bt_actions.document.kinds import KINDS
 from bt_actions.document.language.keys import ACTION_KEYS, LIBRARY_KEYS, TOP_KEYS
-from bt_actions.document.language.kinds import KINDS, Kind
+from bt_actions.document.language.kinds import Kind
 from bt_actions.document.language.scalars import Schema
 from bt_actions.document.language.shapes import Key, keys_schema
 

@@ -1,0 +1,45 @@
+"""The kinds of nodes, a file each (or a few that differ by a word). Importing this fills `KINDS`.
+
+A file says how its kind is read, checked and built; `language/kinds.py` says what a kind is. What
+builds a node imports its behaviour when it is called: reading and checking need none.
+"""
+
+from bt_actions.document.kinds.composites import in_turn, parallel
+from bt_actions.document.kinds.decorators import (
+    for_each,
+    forced,
+    invert,
+    repeat,
+    retry,
+    run_once,
+    timeout,
+    while_,
+)
+from bt_actions.document.kinds.leaves import (
+    action,
+    check,
+    fixed,
+    log,
+    publish,
+    python,
+    run_tree,
+    service,
+    set_,
+    subtree,
+    wait,
+    wait_for_message,
+    wait_until,
+)
+from bt_actions.document.language.kinds import KINDS, register
+
+__all__ = ["KINDS"]
+
+register(
+    *in_turn.KINDS,
+    *(each.KIND for each in (parallel, retry, repeat, timeout, invert)),
+    *forced.KINDS,
+    *(each.KIND for each in (run_once, for_each, while_)),
+    *(each.KIND for each in (action, run_tree, service, publish, wait_for_message, wait)),
+    *(each.KIND for each in (wait_until, set_, log, python, check, subtree)),
+    *fixed.KINDS,
+)

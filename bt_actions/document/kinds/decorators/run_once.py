@@ -1,0 +1,18 @@
+"""`run_once`: one visit of what it holds, whose end is kept."""
+
+from bt_actions.document.kinds.given import Behaviour, Context, TreeNode, py_trees
+from bt_actions.document.language.kinds import EITHER, End, decorator
+
+
+def _build(node: TreeNode, _context: Context, child: Behaviour) -> Behaviour:
+    policy = py_trees.common.OneShotPolicy.ON_COMPLETION
+    return py_trees.decorators.OneShot(node.name, child, policy)
+
+
+KIND = decorator(
+    "run_once",
+    "Runs its child to its end once, and keeps to that end ever after.",
+    "run_once: Calibrate first\nchild:\n  success: Calibrate",
+    build=_build, goes_on=End.SUCCESS, once=True,
+    ends=lambda _values, inner, at_once: EITHER if at_once else inner[0],
+)  # fmt: skip

@@ -1,0 +1,54 @@
+"""What kinds are written with and may not import: types for annotations, and what builds nodes.
+
+Reading and checking are to import no behaviour. So a module here is imported when a kind's `build`
+first takes something out of it, and at run time the types say nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import py_trees
+    from py_trees.behaviour import Behaviour
+
+    from bt_actions.behaviours import (
+        action,
+        decorators,
+        leaves,
+        parallel,
+        reading,
+        run_tree,
+        service,
+        topics,
+    )
+    from bt_actions.document.building import build, parts
+    from bt_actions.document.building.context import Context
+    from bt_actions.document.checking.checker import Checker
+    from bt_actions.document.checking.hazards import Hazards
+    from bt_actions.document.reading.tree import TreeNode
+else:
+    Behaviour = Checker = Context = Hazards = TreeNode = object
+
+    class _Later:
+        def __init__(self, module: str) -> None:
+            self._module = module
+
+        def __getattr__(self, name: str) -> object:
+            value = getattr(import_module(self._module), name)
+            setattr(self, name, value)  # which is not asked for again
+            return value
+
+    py_trees = _Later("py_trees")
+    build, parts = (_Later(f"bt_actions.document.building.{name}") for name in ("build", "parts"))
+    action, decorators, leaves, parallel, reading, run_tree, service, topics = (
+        _Later(f"bt_actions.behaviours.{name}")
+        for name in (
+            "action", "decorators", "leaves", "parallel",
+            "reading", "run_tree", "service", "topics",
+        )
+    )  # fmt: skip
+
+__all__ = [
+    "Behaviour", "Checker", "Context", "Hazards", "TreeNode", "action", "build", "decorators",
+    "leaves", "parallel", "parts", "py_trees", "reading", "run_tree", "service", "topics",
+]  # fmt: skip

@@ -1,0 +1,40 @@
+"""`action`: a goal, its type and server said in place or by a name under `actions`."""
+
+from bt_actions.document.kinds.given import Behaviour, Context, TreeNode, action, parts, reading
+from bt_actions.document.language.keys import ACTION_NAME, ACTION_TYPE, DOING
+from bt_actions.document.language.kinds import ACTION, leaf
+from bt_actions.document.language.scalars import NodeName
+from bt_actions.document.language.values import computed_in
+from bt_actions.document.reading.tree import settings_of
+
+
+def _build(node: TreeNode, context: Context) -> Behaviour:
+    settings = settings_of(node, context.document)
+    overrides_alias = len(node.values) - ("goal" in node.values) - ("save" in node.values) > 1
+    shared = None if overrides_alias else context.shared.get(node.alias)
+    if shared is None:
+        shared = {
+            "action_type": parts.interface_in(settings, "action", context),
+            "action_name": context.name(settings, "server"),
+            **parts.goal_settings(settings, context, reading.of_result),
+        }
+        if not overrides_alias:
+            context.shared[node.alias] = shared
+    goal = settings.get("goal", {})
+    result = shared["action_type"].Result if context.types else None
+    return action.ActionBehaviour(
+        node.name,
+        goal=context.value(goal) if computed_in(goal) else goal,
+        save=context.saved(settings.get("save"), reading.of_result, result),
+        **shared,
+    )
+
+
+KIND = leaf(
+    "action",
+    NodeName(),
+    "Sends a goal to an action; the same as a name under `actions`, with type and server here.",
+    "action: To the part\ntype: robot_control_interfaces/action/MoveRobot\n"
+    "server: move_robot\ngoal: {distance: 2.0}\ntimeout: 30 s",
+    ACTION_TYPE, ACTION_NAME, *DOING, interface=ACTION, build=_build, begun=True,
+)  # fmt: skip
