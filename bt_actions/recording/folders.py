@@ -48,6 +48,8 @@ class Summary:
     """Seconds since 1970."""
     request: str = ""
     """The UUID of the RunTree goal that it answers, or ""."""
+    caller: str = ""
+    """The id of the run whose leaf sent that goal, where it is known."""
     where: Mapping[str, str] = field(default_factory=dict)
     """As RunBegan has it: node, domain, host, simulation."""
     status: str = ""
@@ -146,7 +148,7 @@ def read_summary(first: Path) -> Summary | None:
             data: Any = json.loads(file.read(_LONGEST_SUMMARY))
         text = {
             name: clean(str(data.get(name) or ""))
-            for name in ("run_id", "tree", "request", "status", "stopped_by", "cause")
+            for name in ("run_id", "tree", "request", "caller", "status", "stopped_by", "cause")
         }
         where = {clean(name): clean(str(each)) for name, each in data.get("where", {}).items()}
         code, seconds = data.get("exit_code"), data.get("seconds")

@@ -206,7 +206,8 @@ def begun(began: RunBegan, *, values: bool = True) -> Summary:
     """Return what a list says of a run that has just begun."""
     kept = began if values else bare(began)
     assert isinstance(kept, RunBegan)
-    return Summary(kept.run_id, kept.tree, kept.at.wall, kept.request, dict(kept.where))
+    asked_by = kept.request, kept.caller
+    return Summary(kept.run_id, kept.tree, kept.at.wall, *asked_by, dict(kept.where))
 
 
 def summary(state: State) -> Summary:
@@ -219,6 +220,7 @@ def summary(state: State) -> Summary:
         began.tree,
         began.at.wall,
         began.request,
+        began.caller,
         dict(began.where),
         status=state.status.value if over else "",
         stopped_by=state.stop.who if state.stop is not None else "",

@@ -228,6 +228,12 @@ class TestReport:
         heads = [line for line in capsys.readouterr().out.splitlines() if line[:1].strip()]
         assert heads[0].startswith("deliver: FAILURE")
         assert "below deliver / Move: fetch: FAILURE after 2.00 s" in heads
+        main(["runs"])
+        rows = capsys.readouterr().out.splitlines()[1:]
+        assert ["  below 11111111" in row for row in rows] == [True, False]
+        main(["runs", "--json"])
+        callers = [json.loads(line)["caller"] for line in capsys.readouterr().out.splitlines()]
+        assert callers == ["1" * 32, None]
         main(["report", "fetch"])
         assert capsys.readouterr().out.startswith("fetch: FAILURE")
 
@@ -400,4 +406,6 @@ def test_a_run_that_a_server_of_trees_ran_is_told_below_the_leaf(
     main(["runs", "--failed"])
     rows = columns_of(capsys.readouterr().out)
     assert [row[3] for row in rows] == ["fetch", "deliver"]
-    assert " ".join(rows[0][6:]) == "Far enough: $at > 9.0 is false: $at is 3.125"
+    assert (
+        " ".join(rows[0][6:]) == f"below {rows[1][0]}: Far enough: $at > 9.0 is false: $at is 3.125"
+    )

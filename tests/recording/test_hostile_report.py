@@ -294,6 +294,6 @@ def test_no_summary_makes_more_than_a_line_that_fits(
         assert max(map(len, out.splitlines())) <= 200
         assert out.replace("\n", "").isprintable()
         assert main(["runs", "--json"]) == 0
-        assert len(json.loads(capsys.readouterr().out)) == 13
+        assert len(json.loads(capsys.readouterr().out)) == 14
     summary_of(first).write_text(json.dumps(extreme))
     assert main(["runs"]) == 0

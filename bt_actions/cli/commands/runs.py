@@ -107,6 +107,7 @@ def data(run: Recorded) -> dict[str, object]:
         "seconds": summary.seconds,
         "cause": summary.cause or None,
         "goal": summary.request or None,
+        "caller": summary.caller or None,
         "where": dict(summary.where),
         "path": str(run.first),
     }
@@ -140,7 +141,8 @@ def _row(run: Recorded) -> tuple[str, str, str, str, str, str]:
     status = word or ("goes on" if run.is_written else "never finished")
     world = " in sim" if summary.is_simulated else ""
     seconds = "" if summary.seconds is None else fit(f"{summary.seconds:.2f}", 12)
-    cause = summary.cause or summary.stopped_by
+    below = f"below {summary.caller[:8]}" if summary.caller else ""
+    cause = ": ".join(filter(None, (below, summary.cause or summary.stopped_by)))
     return summary.run_id[:8], when, fit(summary.tree, 30), fit(status, 14) + world, seconds, cause
 
 
