@@ -132,7 +132,7 @@ def _read(first: Path, values: bool, leaf: str = "") -> Report:
         count += 1
     if timeline.state.began is None:
         damaged = timeline.recording.damaged
-        more = f": {damaged} messages in it cannot be read by this version" if damaged else ""
+        more = f": {damaged} messages in it are damaged or of another version" if damaged else ""
         raise RecordingError(f"{first} holds no run{more}")
     goes_on = is_written(first) and timeline.state.ended is None
     left_out = count - len(ends)

@@ -196,7 +196,7 @@ def test_a_run_of_another_version_is_said_to_be_one(tmp_path: Path) -> None:
     plain = [json.loads(to_line(event)) for event in every_kind()]
     plain[1]["colour"] = "red"
     path = raw(tmp_path / "run.mcap", map(json.dumps, plain))
-    assert whole(path) == f"{path} holds no run: 1 messages in it cannot be read by this version"
+    assert whole(path) == f"{path} holds no run: 1 messages in it are damaged or of another version"
     del plain[1]["colour"]
     plain[4]["kind"] = "Flew"
     said = whole(raw(path, map(json.dumps, plain)))
