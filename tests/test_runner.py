@@ -618,7 +618,7 @@ class TestWhoSpins:
             if whose == "the user's":
                 stack.enter_context(spun(node))
             runner = stack.enter_context(TreeRunner(in_sequence(Asks("asks")), node=node))
-            with pytest.raises(TreeError, match="sequence/asks: node /tests was taken out of its"):
+            with pytest.raises(TreeError, match="sequence / asks: node /tests was taken out of"):
                 runner.run(timeout=9.0)
         for each in theirs_all:
             each.shutdown()

@@ -35,6 +35,7 @@ _OF_THE_LEAF = (Outcome.UNEXPECTED_RESULT, Outcome.INVALID_GOAL)
 """Outcomes whose reason the leaf's own expressions give: it may begin with a value."""
 _VALUE = re.compile(r"\{|: |; ")
 """What may stand before a value: an action's `explain` follows a semicolon."""
+_RAISED = re.compile(r".*?: (?:tick|setup) raised \w+")
 _SETTINGS = ("timeouts", "attempts", "memory", "constants")
 """Of a node: those that are no values of the robot's."""
 _WHERE = ("node", "domain", "simulation")
@@ -79,7 +80,15 @@ def _goal(event: GoalChanged) -> GoalChanged:
 
 def _finished(event: TreeFinished) -> TreeFinished:
     left = tuple(replace(each, fields="", reason=said(each.reason)) for each in event.unaccounted)
-    return replace(event, outputs=_hidden(event.outputs), error=said(event.error), unaccounted=left)
+    return replace(
+        event, outputs=_hidden(event.outputs), error=_raised(event.error), unaccounted=left
+    )
+
+
+def _raised(text: str) -> str:
+    """Return of what a node raised the type alone."""
+    found = _RAISED.match(text)
+    return found[0] if found else said(text)
 
 
 _STRIPPED: dict[type[Event], Callable[[Any], Event | None]] = {

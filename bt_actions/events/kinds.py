@@ -256,6 +256,8 @@ class TreeFinished(Event):
     unusable: bool = False
     """Whether the tree cannot be set up as it is given, whatever the world does."""
     unaccounted: tuple[GoalReport, ...] = ()
+    culprit: int | None = None
+    """The node that raised it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,6 +34,7 @@ from bt_actions.recording.folders import (
 from bt_actions.recording.writing import RunWriter
 from bt_actions.story.state import State
 from bt_actions.story.why import attempt_text
+from bt_actions.story.words import judged
 from bt_actions.utilities.batches import Batches
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import fit
@@ -222,7 +223,7 @@ def summary(state: State) -> Summary:
         began.request,
         began.caller,
         dict(began.where),
-        status=state.status.value if over else "",
+        status=judged(state).value if over else "",
         stopped_by=state.stop.who if state.stop is not None else "",
         exit_code=ended.exit_code if ended is not None else None,
         seconds=state.elapsed,

@@ -19,7 +19,7 @@ from bt_actions.recording.timeline import Line, Timeline
 from bt_actions.story.state import State
 from bt_actions.story.values import clock
 from bt_actions.story.why import why
-from bt_actions.story.words import action_table, left_open, troubles, verdict
+from bt_actions.story.words import action_table, left_open, troubles, verdict_on
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import MESSAGE, brief, fit, shorten
 
@@ -89,7 +89,7 @@ class Report:
         if not self.is_over:
             return "goes on" if self.goes_on else "never finished"
         cause = f", {state.ended.cause}" if state.ended is not None and state.ended.cause else ""
-        return clean(f"{verdict(state.status, state.elapsed)}{cause}")
+        return clean(f"{verdict_on(state)}{cause}")
 
 
 def reports(first: Path, *, values: bool = True, where: Path | None = None) -> list[Report]:

@@ -296,13 +296,18 @@ class TickLoop:
         try:
             step()
         except Misbehaviour as error:
-            raise TreeError(f"{'/'.join(path_of(error.behaviour))}: {error}") from None
+            raise self._wrong(TreeError, error.behaviour, str(error)) from None
         except TwoTypes as error:
-            where = "/".join(path_of(culprit_of(error) or self.tree.root))
-            raise UnusableTree(f"{where}: {error}") from None
+            raise self._wrong(UnusableTree, culprit_of(error), str(error)) from None
         except Exception as error:
-            where = "/".join(path_of(culprit_of(error) or self.tree.root))
-            raise TreeError(f"{where}: {self._doing} raised {raised(error)}") from error
+            what = f"{self._doing} raised {raised(error)}"
+            raise self._wrong(TreeError, culprit_of(error), what) from error
+
+    def _wrong(self, kind: type[TreeError], culprit: Behaviour | None, what: str) -> TreeError:
+        culprit = culprit or self.tree.root
+        error = kind(f"{' / '.join(path_of(culprit))}: {what}")
+        error.culprit = culprit
+        return error
 
     # Its end
 

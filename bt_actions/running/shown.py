@@ -16,7 +16,7 @@ from bt_actions.document.language.types import parse_type
 from bt_actions.events import Event, RunBegan
 from bt_actions.story.state import State
 from bt_actions.story.why import why_text
-from bt_actions.story.words import begins_text, verdict
+from bt_actions.story.words import begins_text, judged, verdict
 from bt_actions.utilities.plain_text import in_words
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class ShownRun:
         unaccounted = self._runner.unaccounted
         for goal in unaccounted:
             self._rosout.say("error", f"{name}: not accounted for: {goal}")
-        text = f"{name} ends: {verdict(state.status, state.elapsed)}"
+        text = f"{name} ends: {verdict(judged(state), state.elapsed)}"
         text += ", left without waiting for its goals" if left else ""
         wrong = left or unaccounted or failed
         self._rosout.say("error" if wrong else "info", text)

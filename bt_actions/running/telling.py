@@ -34,6 +34,9 @@ _ALL = sys.maxsize
 class TreeError(Exception):
     """A behaviour raised or had no status, or the spin thread died; the goals have been drained."""
 
+    culprit: Behaviour | None = None
+    """The behaviour."""
+
 
 class UnusableTree(TreeError):
     """The tree cannot be set up as it is given, whatever the world does."""
@@ -174,6 +177,7 @@ class TreeTeller(Teller):
             "" if error is None else where_raised(error),
             isinstance(error, UnusableTree),
             tuple(unaccounted),
+            self.numbers.get(getattr(error, "culprit", None)),
         )
 
 

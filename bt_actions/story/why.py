@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 
 from py_trees.common import Status
 
-from bt_actions.events.kinds import Node, RoundBegan
+from bt_actions.events.kinds import Node, RoundBegan, TreeFinished
 from bt_actions.events.snapshot import HIDDEN
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory, GoalStory
@@ -58,7 +58,7 @@ def why(state: State, now: float | None = None) -> list[str]:
         return waits(state, state.latest if now is None else now)
     stories = [list(_told(failure, state)) for failure in state.failures]
     if state.finished.error:
-        stories = [[clean(f"{clock(state.finished.at.wall)}  {state.finished.error}")]]
+        stories = [list(_raised(state, state.finished))]
     elif state.status is Status.INVALID and state.stopped:
         stories = [["stopped while it ran:"], *(list(_told(each, state)) for each in state.stopped)]
     if not stories:
@@ -120,6 +120,19 @@ def _told(failure: Failure, state: State) -> Iterator[str]:
     passed = ", ".join(f"{above.name} ({above.kind})" for above in holders)
     place = failure.place or f"{failure.node.name} ({failure.node.kind})"
     yield clean(f"  {place}{f'; passed on by {passed}' if passed else ''}")
+
+
+def _raised(state: State, finished: TreeFinished) -> Iterator[str]:
+    """Yield when, where and in which item a node raised something; what; and its place."""
+    when, story = clock(finished.at.wall), state.nodes.get(finished.culprit or 0)
+    if story is None:  # no behaviour's fault
+        yield clean(f"{when}  {finished.error}")
+        return
+    path = " / ".join(state.path(story.node.id))
+    yield clean(f"{when}  {path}{_items(state.rounds(story.node.id))}")
+    if what := finished.error.removeprefix(path).removeprefix(": "):
+        yield clean(f"  {what}")
+    yield clean(f"  {story.node.place or f'{story.node.name} ({story.node.kind})'}")
 
 
 def _attempts(failure: Failure) -> Iterator[str]:

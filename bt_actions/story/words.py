@@ -42,11 +42,17 @@ def verdict(status: Status, seconds: float | None) -> str:
     return word if seconds is None else f"{word} after {seconds:.2f} s"
 
 
+def judged(state: State) -> Status:
+    """Return how a run has ended: where a behaviour raised, nobody has stopped it."""
+    raised = state.finished is not None and state.finished.error and state.stop is None
+    return Status.FAILURE if raised else state.status
+
+
 def verdict_on(state: State) -> str:
     """Say how a run has ended, or that it has not finished."""
     if state.finished is None and state.ended is None:
         return f"NOT FINISHED after {state.elapsed:.2f} s"
-    return verdict(state.status, state.elapsed)
+    return verdict(judged(state), state.elapsed)
 
 
 def last_words(state: State, width: int = MESSAGE) -> list[str]:

@@ -197,7 +197,7 @@ def test_what_a_behaviour_raised_in_a_program_is_told_on_rosout(watcher: Watcher
         _, (level, reason), (_, ends) = watcher.hears("of_a_bad_program", "ends")
     assert level == 40
     assert "  bad: tick raised RuntimeError: on purpose in update (" in reason
-    assert ends.startswith("bad ends: STOPPED after ")
+    assert ends.startswith("bad ends: FAILURE after ")
 
 
 def test_a_run_that_is_ended_by_a_signal_says_so_last_of_all(

@@ -161,7 +161,7 @@ class ForgetfulComposite(py_trees.composites.Composite):
 def test_a_behaviour_without_status_ends_the_run_and_nothing_passes_over_it(bad: Any) -> None:
     then = py_trees.behaviours.Success("then")
     root = in_turn(in_sequence(bad, name="branch"), then, name="root")
-    with pytest.raises(TreeError, match=r"^root/branch/forgets: no status after its tick"):
+    with pytest.raises(TreeError, match=r"^root / branch / forgets: no status after its tick"):
         Stepped(root).run()
 
 
@@ -213,7 +213,7 @@ class TestSetup:
         calls: list[str] = []
         root = in_sequence(Counted("a", calls), Counted("b", calls, fails=1), name="root")
         stepped = Stepped(root)
-        with pytest.raises(TreeError, match="root/b: setup raised OSError: no device"):
+        with pytest.raises(TreeError, match="root / b: setup raised OSError: no device"):
             stepped.run()
         stepped.run()
         assert calls == ["setup a", "setup b", "setup b", "a", "b"]
@@ -242,7 +242,7 @@ class TestSetup:
         root, new = in_sequence(Gate(), name="root"), Raises("new", "setup")
         tree = BehaviourTree(root)
         tree.add_pre_tick_handler(lambda _: root.add_child(new))
-        with pytest.raises(TreeError, match=r"^root/new: setup raised"):
+        with pytest.raises(TreeError, match=r"^root / new: setup raised"):
             Stepped(tree).run()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -14,7 +15,7 @@ from py_trees.common import Access, Status
 from robot_control_interfaces.action import Gripper as GripperAction
 from robot_control_interfaces.action import MoveRobot as Move
 
-from bt_actions import ActionBehaviour, MoveRobot, Retry, Timeouts, load_tree
+from bt_actions import ActionBehaviour, MoveRobot, Retry, Timeouts, TreeError, load_tree
 from bt_actions.events import (
     AttemptEnded,
     Event,
@@ -27,6 +28,7 @@ from bt_actions.events import (
     RunBegan,
     ServerSeen,
     StopWanted,
+    TreeFinished,
     VariableWritten,
     to_line,
 )
@@ -480,6 +482,22 @@ class TestWhatIsOdd:
         assert "not done within 2 s" in said[1]
         assert said[2].startswith("  it stopped Go: CANCELED: ")
         assert "goal {distance: 7.0}" in said[2]
+
+    def test_a_behaviour_that_raises_is_told_with_its_place(self) -> None:
+        def breaks(tick: int) -> None:
+            raise ValueError("no camera 3")
+
+        runner = VirtualRunner(in_sequence(Does("Camera", breaks), name="Main"))
+        with pytest.raises(TreeError, match=r"^Main / Camera: tick raised ValueError: no camera 3"):
+            runner.run()
+        (finished,) = events_of(runner, TreeFinished)
+        assert finished.culprit == 2
+        where, what, place = why(runner.state)
+        assert where.endswith("  Main / Camera")
+        assert re.fullmatch(
+            r"  tick raised ValueError: no camera 3 \(.*test_telling.py:\d+\)", what
+        )
+        assert place == "  Camera (Does)"
 
     def test_a_run_that_is_stopped_says_in_what(self) -> None:
         network = VirtualNetwork()

@@ -238,7 +238,7 @@ class TestABehaviourThatRaises:
             if method != "setup":
                 until(lambda: state(leaf) == "EXECUTING")
             gate.passed = True
-            with pytest.raises(TreeError, match=r"root/branch/culprit: .*on purpose"):
+            with pytest.raises(TreeError, match=r"root / branch / culprit: .*on purpose"):
                 runner.wait(5.0)
             assert runner.unaccounted == []
         assert journal.ends() == ([] if method == "setup" else ["canceled"])
@@ -263,7 +263,7 @@ class TestABehaviourThatRaises:
         leaf = MoveRobot("m", 5.0, action_name=name)
         root = together(leaf, Raises("culprit", method), name="root")
         with TreeRunner(root, node=node) as runner:
-            with pytest.raises(TreeError, match="root/culprit"):
+            with pytest.raises(TreeError, match="root / culprit"):
                 runner.run(timeout=5.0)
             assert journal.ends() == ["canceled"]
             assert leaf.status is Status.INVALID
@@ -281,7 +281,7 @@ class TestABehaviourThatRaises:
         with started(root, node=node) as runner:
             until(lambda: state(leaf) == "EXECUTING")
             guard.holds = True
-            with pytest.raises(TreeError, match=r"root/branch/culprit: .*on purpose"):
+            with pytest.raises(TreeError, match=r"root / branch / culprit: .*on purpose"):
                 runner.wait(5.0)
         assert journal.ends() == ["canceled"]
         record.outcome = NAMED_AND_CANCELED

@@ -12,11 +12,14 @@ from bt_actions import MoveRobot, Retry, Timeouts, load_tree
 from bt_actions.behaviours.decorators import Deadline
 from bt_actions.behaviours.leaves import Wait
 from bt_actions.events import Event, StopWanted
+from bt_actions.events.bare import bare
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.doing import doing
 from bt_actions.story.state import State
 from bt_actions.story.why import why, why_text
+from bt_actions.story.words import verdict_on
 from bt_actions.testing import Script, ScriptedServer, Simulation, VirtualNetwork, VirtualRunner
+from tests.support.stories import state_of
 from tests.support.told_trees import FakeAction, FakeNode, Story
 from tests.support.trees import together
 
@@ -297,6 +300,33 @@ def test_of_two_leaves_of_one_name_that_were_stopped_the_path_tells_which() -> N
     )
     stopped = [line for line in lines(state) if "it stopped" in line]
     assert sorted(stopped) == ["  it stopped Left / Wait", "  it stopped Right / Wait"]
+
+
+def test_what_a_behaviour_raised_tells_where_in_which_item_and_what() -> None:
+    camera = FakeNode("Camera", kind="python", place="x.yaml:5:3")
+    each = FakeNode("Each", [camera], "for_each")
+    story = Story(FakeNode("Main", [each]))
+    error = "Main / Each / Camera: tick raised ValueError: no camera 3 (leaf.py:12)"
+    begins = story.round(each, 1, 3.0, of=3)
+    state = story.told(begins, story.finish(Status.INVALID, error=error, culprit=camera.id))
+    assert lines(state) == [
+        "Main / Each / Camera, item 2 of 3 of Each (3.0)",
+        "  tick raised ValueError: no camera 3 (leaf.py:12)",
+        "  x.yaml:5:3",
+    ]
+    assert verdict_on(state).startswith("FAILURE after ")
+    told = [bare(event) for event in (story.began, begins, state.finished) if event is not None]
+    assert lines(state_of(event for event in told if event is not None))[1:] == [
+        "  tick raised ValueError",
+        "  x.yaml:5:3",
+    ]
+
+
+def test_a_run_that_somebody_stopped_is_stopped_whatever_its_leaves_raise_then(
+    story: Story,
+) -> None:
+    state = story.told(stopping(story), story.finish(Status.INVALID, error="Deliver: raised"))
+    assert verdict_on(state).startswith("STOPPED after ")
 
 
 def test_what_a_behaviour_raised_is_all_of_the_first_line(story: Story, leaf: FakeNode) -> None:

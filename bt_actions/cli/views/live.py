@@ -19,7 +19,7 @@ from bt_actions.events import Event, NodeChanged, RoundBegan, RunBegan, StopWant
 from bt_actions.events.kinds import NodesAdded, NodesRemoved
 from bt_actions.story.doing import doing
 from bt_actions.story.state import OVER, NodeStory, State
-from bt_actions.story.words import goal_text, last_words, stopping_text
+from bt_actions.story.words import goal_text, judged, last_words, stopping_text
 from bt_actions.utilities.plain_text import clean
 
 _STYLES = {
@@ -130,7 +130,7 @@ class LiveView(View):
         self.close()
         state = self._state
         caused = state.ended is not None and bool(state.ended.cause)
-        colour = "yellow" if caused else _STYLES[state.status]
+        colour = "yellow" if caused else _STYLES[judged(state)]
         for line in last_words(state, self._console.width):
             ending = line.startswith(("SUCCESS after", "FAILURE after", "STOPPED after"))
             style = f"bold {colour}" if ending else ""

@@ -40,6 +40,7 @@ export function create_head(app) {
   function standing() {
     const { run, s, link } = app, over = run.over && app.at_head;
     if (run.gap_at(app.t)) return ["Not recorded", "stopped"];
+    if (s.finished?.error && !s.stop) return STATE.failure;
     if (s.finished) return { SUCCESS: STATE.success, FAILURE: STATE.failure, INVALID: ["Stopped", "stopped"] }[s.finished.status];
     if (over && !link.ended) return ["Never finished", "stopped"];
     if (s.paused) return ["Paused", "waiting"];
