@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from mcap.writer import Writer
 
+from bt_actions import MoveRobot
 from bt_actions.cli import main
 from bt_actions.cli.commands.report import data
 from bt_actions.events import GoalChanged, to_line
@@ -26,6 +27,7 @@ from bt_actions.recording.report import markdown, reports, text
 from bt_actions.recording.statistics import Statistics
 from bt_actions.recording.tape import Tape
 from bt_actions.story.keeping import to_json
+from bt_actions.testing import VirtualNetwork, serve_as_recorded
 from bt_actions.utilities.plain_text import as_json
 from tests.support.every_kind import every_kind
 from tests.support.recordings import record
@@ -139,6 +141,11 @@ def compared(first: Path) -> None:
         shutil.rmtree(good.parent)
 
 
+def served(first: Path) -> None:
+    leaf = MoveRobot("Move", 1.0, action_name="/move")
+    serve_as_recorded(VirtualNetwork(), leaf, first).close()
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     "reader",
@@ -149,8 +156,9 @@ def compared(first: Path) -> None:
         played,
         compared,
         lambda first: Statistics().add(Recording(first).items()),
+        served,
     ],
-    ids=["lines", "all lines", "json", "played", "diff", "stats"],
+    ids=["lines", "all lines", "json", "played", "diff", "stats", "servers"],
 )
 def test_no_recording_makes_more_than_an_error_in_words_for_any_reader(
     tmp_path: Path, seed: int, reader: Callable[[Path], None]
