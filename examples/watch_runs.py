@@ -8,7 +8,7 @@ import contextlib
 import sys
 
 import rclpy
-from bt_actions_interfaces.msg import RunEvent, RunStates
+from bt_actions_interfaces.msg import RunEvent, RunState, RunStates
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -29,6 +29,8 @@ class Watcher:
         self._numbers: dict[str, int] = {}
         self._ahead: dict[str, list[RunEvent]] = {}
         """Events that a state has to come before: one before them is missing."""
+        self._states: dict[str, RunState] = {}
+        """The latest of each run: it may come before the events that it stands behind."""
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         node.create_subscription(RunEvent, f"{watched}/events", self.event, QoSProfile(depth=1000))
         node.create_subscription(RunStates, f"{watched}/tree", self.states, latched)
@@ -39,6 +41,7 @@ class Watcher:
         known = self._numbers.get(run, 0)
         if message.number > known + 1:
             self._ahead.setdefault(run, []).append(message)
+            self.catch_up(run)
         elif message.number == known + 1:
             self._numbers[run] = message.number
             state = self.runs.setdefault(run, State())
@@ -50,11 +53,16 @@ class Watcher:
         """Take in how those runs stand of which events are missing, and what has happened since."""
         for each in message.runs:
             run = bytes(each.run_id).hex()
-            known = self._numbers.get(run, 0)
-            if each.number > known and (run in self._ahead or not known):
-                self._numbers[run], self.runs[run] = each.number, from_json(each.data)
-                for waiting in self._ahead.pop(run, []):
-                    self.event(waiting)
+            self._states[run] = each
+            self.catch_up(run)
+
+    def catch_up(self, run: str) -> None:
+        """Go on from the latest state where that stands behind events that are missing."""
+        known, state = self._numbers.get(run, 0), self._states.get(run)
+        if state is not None and state.number > known and (run in self._ahead or not known):
+            self._numbers[run], self.runs[run] = state.number, from_json(state.data)
+            for waiting in self._ahead.pop(run, []):
+                self.event(waiting)
 
     def follows(self, run: str, message: RunEvent) -> None:
         """Tell of an event that has been taken in."""
