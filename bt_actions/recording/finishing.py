@@ -12,8 +12,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-
-from mcap.writer import CompressionType, Writer
+from typing import TYPE_CHECKING
 
 from bt_actions.recording.folders import held, parts_of
 from bt_actions.recording.layout import CHANNELS, LAYOUTS, QOS, schema_of
@@ -28,6 +27,9 @@ from bt_actions.recording.mcap_records import (
     records,
 )
 from bt_actions.utilities.whole_file import replacing
+
+if TYPE_CHECKING:
+    from mcap.writer import Writer
 
 AT_ONCE = 1_000_000
 """Bytes that take less than 0.3 s to finish."""
@@ -87,6 +89,8 @@ def finish_beside(*firsts: Path, may_wait: bool) -> subprocess.Popen[bytes] | No
 
 def _rewrite(part: Path) -> bool:
     """Write the records of a file to another one, and put that in its place; else return False."""
+    from mcap.writer import CompressionType, Writer  # slow, and needed when a run is over
+
     try:
         with replacing(part) as file, part.open("rb") as source:
             writer = Writer(file, chunk_size=_CHUNK, compression=CompressionType.ZSTD)

@@ -94,7 +94,7 @@ class Session:
         self._error: BaseException | None = None
         self._shown = ShownRun(self._runner, root)
         self._runner.on_close(lambda: self._shown.close(error=self._error))
-        if publish_values is not None:
+        if publish_values is not None and simulation is None:  # where nobody could listen
             from bt_actions.ros.run_topics import RunTopics
 
             topics = RunTopics(self._runner.node, values=publish_values)
