@@ -209,7 +209,7 @@ def find(text: str = "", where: Path | None = None) -> Path:
     text. Raises NoRun.
     """
     path = Path(text).expanduser()
-    if text and ("/" in text or path.suffix == ".mcap"):
+    if text and ("/" in text or path.suffix == ".mcap" or path.is_file()):
         first = path / FIRST if path.is_dir() else path
         if first.is_file():
             return first

@@ -30,20 +30,15 @@ class Follower:
         self._at = 0
         """Bytes of the present file that were read."""
 
-    def look(self) -> list[Item]:
-        """Return what has come since the last look: events, and a state where some are missing.
-
-        Raises OSError, and ValueError for a file that is none of ours.
-        """
-        return list(self.news())
-
     def news(self) -> Iterator[Item]:
-        """Yield the same, for a reader who takes all of it: one file at most is held in memory."""
+        """Yield what has come since the last time: events, and a state where some are missing.
+
+        Of the files one at most is held in memory. Raises OSError, and ValueError for a file that
+        is none of ours.
+        """
         while True:
             first = self.recording.first
-            parts = parts_of(
-                first
-            )  # before the reading: a file is whole once the next one is there
+            parts = parts_of(first)  # first of all: a file is whole once the next one is there
             later = parts[self._place(parts) + 1 :]
             yield from self._more(is_whole=bool(later) or not is_written(first))
             if not later:

@@ -226,6 +226,14 @@ class TestFind:
         (tmp_path / "bag" / "bag_0.mcap").touch()
         assert find(str(tmp_path / "bag")) == tmp_path / "bag" / "bag_0.mcap"
 
+    def test_a_file_that_lies_here_is_meant_and_not_a_tree_of_its_name(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        made(tmp_path, 1, tree="README.md")
+        (tmp_path / "README.md").touch()
+        assert find("README.md", tmp_path) == Path("README.md")
+
     def test_what_there_is_not_is_said_with_what_is_near(self, tmp_path: Path) -> None:
         with pytest.raises(NoRun, match="no run is recorded yet"):
             find("", tmp_path)

@@ -46,15 +46,15 @@ def test_a_follower_gets_each_event_once_however_often_it_looks(tmp_path: Path, 
             writer.add(event)
             writer.flush()
             if number % 3 == 0:
-                found += follower.look()
+                found += list(follower.news())
         writer.close()
-        found += follower.look()
-        assert follower.look() == []
+        found += list(follower.news())
+        assert list(follower.news()) == []
     with Follower(first) as follower:
-        assert list(map(repr, follower.look())) == list(map(repr, events))
+        assert list(map(repr, list(follower.news()))) == list(map(repr, events))
         assert finish(first)
         assert is_finished(first)
-        assert follower.look() == []
+        assert list(follower.news()) == []
         assert follower.recording.damaged == 0
     assert list(map(repr, found)) == list(map(repr, events))
 
@@ -72,7 +72,7 @@ def test_what_is_half_written_is_read_when_it_is_whole(tmp_path: Path) -> None:
         for at in range(0, len(data), 97):
             with first.open("ab") as file:
                 file.write(data[at : at + 97])
-            found += follower.look()
+            found += list(follower.news())
     assert list(map(repr, found)) == list(map(repr, events))
 
 
@@ -83,12 +83,12 @@ def test_a_run_that_is_finished_between_two_looks_goes_on_where_it_was(tmp_path:
         for event in events[:100]:
             writer.add(event)
         writer.flush()
-        found = follower.look()
+        found = list(follower.news())
         for event in events[100:]:
             writer.add(event)
         writer.close()
         finish(first)
-        found += follower.look()
+        found += list(follower.news())
     assert list(map(repr, found)) == list(map(repr, events))
 
 
@@ -110,7 +110,7 @@ def test_what_is_written_while_a_follower_reads_is_read(tmp_path: Path) -> None:
             for item in follower.news():
                 found.append(item)
                 written(3)
-        found += follower.look()
+        found += list(follower.news())
     assert len(parts_of(first)) > 2
     assert list(map(repr, found)) == list(map(repr, events))
 
@@ -137,7 +137,7 @@ def test_a_damaged_length_costs_a_follower_a_message(
         data = bytearray(first.read_bytes())
         data[at + 1 + bit // 8] ^= 1
         first.write_bytes(data)
-        found = follower.look()
+        found = list(follower.news())
     numbers = {item.at.number for item in found if not isinstance(item, State)}
     missing = {each.at.number for each in events} - numbers
     assert missing <= {events[20].at.number}
@@ -151,12 +151,12 @@ def test_a_follower_that_was_too_late_for_a_file_gets_the_state_behind_it(tmp_pa
         for event in events[:50]:
             writer.add(event)
         writer.flush()
-        found = follower.look()
+        found = list(follower.news())
         for event in events[50:]:
             writer.add(event)
             writer.flush()
         writer.close()
-        found += follower.look()
+        found += list(follower.news())
     assert any(isinstance(each, State) for each in found)
     assert last_words(folded(found)) == last_words(state_of(events))
 
