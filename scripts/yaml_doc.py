@@ -46,6 +46,7 @@ FUNCTIONS = {
     "min": "`min($list)`, `min($a, $b)` | the least number or text",
     "max": "`max($list)`, `max($a, $b)` | the greatest number or text",
     "round": "`round($x)`, `round($x, 2)` | the nearest whole number, or so many digits",
+    "sqrt": "`sqrt($x)` | the square root of a number that is not negative",
     "int": "`int($x)` | a number without its fraction; the whole number that a text holds",
     "float": "`float($x)` | the number that a text holds",
     "str": "`str($x)` | a number, true or false as a text",
@@ -106,7 +107,7 @@ may hold `.inf` and `.nan`; inputs are finite. A mapping that is written out
 The names of nodes are taken as they stand: a variable in one is shown as it is written.
 
 Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices and
-slices (`$list[-1]`, `$list[1:3]`), `true` and `false`, and constants
+slices (`$list[-1]`, `$list[1:3]`), `1 if $empty else 2`, `true` and `false`, and constants
 (`MoveRobot.Result.STATUS_FAULT`). A plus sign also joins two texts, and two lists:
 `= $names + ['part ' + str($count)]`. In `expect`, `save` and `when` the bare name `result` is the
 result, and of a `run_tree` `outputs` what its tree gave; in `until` and `save` of

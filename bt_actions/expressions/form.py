@@ -156,6 +156,9 @@ class Form:
                 return self._guard(node, BINARY[type(binary)], part(left), part(right))
             case ast.BoolOp(op=bool_op, values=values):
                 return self._compile_bool(isinstance(bool_op, ast.And), values, part)
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                then, asked, otherwise = part(body), part(test), part(orelse)  # in reading order
+                return _either(self._guard(test, truth, asked), then, otherwise)
             case ast.Compare(left=left, ops=ops, comparators=rights):
                 return self._compile_compare(node, [left, *rights], ops, part)
             case ast.List(elts=items) | ast.Tuple(elts=items):
@@ -286,6 +289,10 @@ def _constant(value: object) -> _Closure:
 _NOTHING = _constant(None)
 
 
+def _either(asked: _Closure, then: _Closure, otherwise: _Closure) -> _Closure:
+    return lambda *known: (then if asked(*known) else otherwise)(*known)
+
+
 def _listing(parts: list[_Closure]) -> _Closure:
     return lambda roots, variable, names: [part(roots, variable, names) for part in parts]
 
@@ -353,7 +360,6 @@ def _why_not(node: ast.expr) -> str:
         return f"there is no 'None' here: {_ASKED}"
     names: dict[type[ast.expr], str] = {
         ast.Lambda: "a lambda",
-        ast.IfExp: "'if'",
         ast.Dict: "a mapping",
         ast.Set: "a set",
         ast.ListComp: "a comprehension",

@@ -64,6 +64,13 @@ def _extreme(name: str, function: Callable[..., object]) -> Callable[..., object
     return call
 
 
+def _root(value: object) -> float:
+    value = number(value)
+    if value < 0:
+        raise ValueError(f"{show(value)} has no square root")
+    return math.sqrt(value)
+
+
 def _round(value: object, digits: object = None) -> int | float:
     rounded, digits = number(value), plain(digits)
     if digits is None:
@@ -119,6 +126,7 @@ FUNCTIONS = MappingProxyType[str, Callable[..., object]](
         "min": _extreme("min", min),
         "max": _extreme("max", max),
         "round": _round,
+        "sqrt": _root,
         "int": _int,
         "float": _float,
         "str": _str,

@@ -29,7 +29,7 @@ _BAD_WORDS = {
     "&": "write 'and'",
     "|": "write 'or'",
     "<>": "write '!='",
-    "?": "there is no conditional expression",
+    "?": "write 'A if CONDITION else B'",
     ";": "one expression only",
     "#": "a comment has no place in an expression",
     "\\": "a backslash has no place here",

@@ -295,11 +295,12 @@ class Checker:
             if isinstance(item, Computed):
                 given = types[id(item)]
                 if not fits(given, wanted):
-                    said = item.expression.text.strip()
+                    verb = "is"
                     if isinstance(given, Either):
                         given = next(kind for kind in given.kinds if not fits(kind, wanted))
-                        said = f"in one item {said}"
-                    text = f"{named(wanted)} is needed, and {said} is {named(given)}"
+                        verb = "may be"
+                    said = f"{item.expression.text.strip()} {verb} {named(given)}"
+                    text = f"{named(wanted)} is needed, and {said}"
                     self.source.report("BT204", span_of(item.node), text)
                 elif texts := misfits(given, wanted):
                     for text in texts:

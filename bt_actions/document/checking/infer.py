@@ -6,7 +6,7 @@ Says what is wrong with it through a callback; an unknown type is None and never
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from bt_actions.document.checking.value_types import (
     BOOL,
@@ -17,6 +17,7 @@ from bt_actions.document.checking.value_types import (
     common_type,
     comparable,
     has_length,
+    is_float,
     is_number,
     is_text,
     joined,
@@ -123,6 +124,9 @@ class _Inference:
                 for part in values:
                     self._truth(part)
                 return BOOL
+            case ast.IfExp(test=test, body=body, orelse=orelse):
+                self._truth(test)
+                return _one_of([self.any_type_of(body), self.any_type_of(orelse)])
             case ast.List(elts=items) | ast.Tuple(elts=items):
                 kinds = [self.type_of(item) for item in items]
                 same = kinds and kinds[0] is not None and all(kind == kinds[0] for kind in kinds)
@@ -339,8 +343,10 @@ class _Inference:
             if not (kind is None or wanted(kind)):
                 self._wrong(args[0], lacks.format(named(kind)))
             return gives
-        if name in ("abs", "round"):
+        if name in ("abs", "round", "sqrt"):
             kind = self._number(args[0])
+            if name == "sqrt":
+                return FLOAT
             for digits in args[1:]:
                 self._index(digits, self.type_of(digits), "a number of digits")
             return INTEGER if name == "round" and len(args) == 1 else kind
@@ -355,10 +361,15 @@ class _Inference:
             first = known[0][1]
             if not comparable(first, kind):
                 self._wrong(arg, f"{named(first)} is never compared with {named(kind)}")
-        if all(is_number(kind) for kind in kinds):
-            floats = any(isinstance(kind, Scalar) and kind.name in FLOATS for kind in kinds)
-            return FLOAT if floats else INTEGER
-        return kinds[0] if all(kind == kinds[0] for kind in kinds) else None
+        kind = _one_of(kinds)
+        return None if isinstance(kind, Either) else kind
+
+
+def _one_of(kinds: Sequence[FieldType | None]) -> FieldType | None:
+    """The type of a value that has one of these types."""
+    if all(is_number(kind) for kind in kinds):
+        return FLOAT if any(is_float(kind) for kind in kinds) else INTEGER
+    return common_type(kinds)
 
 
 def _power(exponent: ast.expr, kind: FieldType) -> FieldType | None:
