@@ -12,10 +12,7 @@ imports rclpy.
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import html
-import json
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -28,6 +25,7 @@ from bt_actions.document import place_of
 from bt_actions.render.card import Table, describe, interface_of, tables
 from bt_actions.render.graphviz import RenderError
 from bt_actions.render.look import NodeRow, direction_of, label, look, rows
+from bt_actions.render.one_file import data_text, policy
 from bt_actions.render.outline import text
 from bt_actions.render.written import document_of, node_of, own_text
 from bt_actions.utilities.plain_text import clean
@@ -57,11 +55,11 @@ def page(root: Behaviour, *, direction: str | None = None, depth: int | None = N
         )
     style, script = _file("page.css"), _script()
     parts = {
-        "policy": _policy(style, script),
+        "policy": policy(script, style),
         "title": html.escape(clean(root.name)),
         "style": style,
         "script": script,
-        "data": _json(_data(nodes, direction, depth)),
+        "data": data_text(_data(nodes, direction, depth)),
         "outline": html.escape(text(root)),
     }
     return _PLACEHOLDER.sub(lambda found: parts[found[1]], _file("page.html"))
@@ -118,25 +116,6 @@ def _data(nodes: Sequence[NodeRow], direction: str | None, depth: int | None) ->
         "tables": list(shared),
         "nodes": shown,
     }
-
-
-def _json(data: object) -> str:
-    """JSON that can stand in a script element: no character of it can end or begin anything."""
-    written = json.dumps(data, separators=(",", ":"))  # ASCII only
-    for character in "<>&":
-        written = written.replace(character, f"\\u{ord(character):04x}")
-    return written
-
-
-def _policy(style: str, script: str) -> str:
-    return (
-        f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; "
-        "base-uri 'none'; form-action 'none'; require-trusted-types-for 'script'"
-    )
-
-
-def _hash(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def _script() -> str:

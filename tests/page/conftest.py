@@ -1,9 +1,13 @@
-"""The page's server on a port of its own, over runs of its own."""
+"""The page's server on a port of its own, over runs of its own; and a browser."""
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +15,9 @@ from bt_actions.events import Event, RunBegan
 from bt_actions.page import server
 from bt_actions.recording.folders import FIRST, Summary, folder_for, held, home, write_summary
 from bt_actions.recording.writing import RunWriter
+from tests.support import browser as chromium
+
+ROOT = Path(__file__).parents[2]
 
 
 class Served:
@@ -79,3 +86,27 @@ def begin() -> Iterator[Begin]:
     yield one
     for each in begun:
         each.end()
+
+
+@pytest.fixture(scope="module")
+def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
+    with chromium.browser(tmp_path_factory.mktemp("browser")) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def night(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What examples/night has recorded, in a simulation in which its last move is aborted."""
+    state = tmp_path_factory.mktemp("night")
+    command = "run examples/night/night.yaml --sim --speed 20 --fault move_robot:12:abort"
+    done = subprocess.run(
+        [sys.executable, "-m", "bt_actions.cli", *command.split()],
+        cwd=ROOT,
+        env={**os.environ, "XDG_STATE_HOME": str(state)},
+        capture_output=True,
+        text=True,
+        timeout=100.0,
+        check=False,
+    )
+    assert done.returncode == 1, done.stderr
+    return state

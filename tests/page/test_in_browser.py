@@ -5,9 +5,6 @@ Skipped where there is no Chromium with its chromedriver.
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
@@ -23,16 +20,9 @@ from tests.support.every_kind import RUN_ID
 from tests.support.recordings import record
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing() or "-")
-ROOT = Path(__file__).parents[2]
 SETTLED = "window.page?.settled"
 WHY = "document.getElementById('why').innerText"
 ROWS = "[...document.querySelectorAll('.row:not([hidden])')].map((one) => one.innerText)"
-
-
-@pytest.fixture(scope="module")
-def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
-    with chromium.browser(tmp_path_factory.mktemp("browser")) as opened:
-        yield opened
 
 
 class Page:
@@ -70,24 +60,6 @@ def page(window: chromium.Browser, served: Served) -> Iterator[Page]:
 
 
 # A run that is over
-
-
-@pytest.fixture(scope="module")
-def night(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What examples/night has recorded, in a simulation in which its last move is aborted."""
-    state = tmp_path_factory.mktemp("night")
-    command = "run examples/night/night.yaml --sim --speed 20 --fault move_robot:12:abort"
-    done = subprocess.run(
-        [sys.executable, "-m", "bt_actions.cli", *command.split()],
-        cwd=ROOT,
-        env={**os.environ, "XDG_STATE_HOME": str(state)},
-        capture_output=True,
-        text=True,
-        timeout=100.0,
-        check=False,
-    )
-    assert done.returncode == 1, done.stderr
-    return state
 
 
 @pytest.fixture

@@ -21,11 +21,12 @@ examples:
   bt-actions report 96399112                     # the first letters of an id: `bt-actions runs`
   bt-actions report pick_and_place --full        # the last run of a tree, each line of it
   bt-actions report monday.mcap -o monday.md
+  bt-actions report -o run.html                  # the page of `bt-actions view`, in one file
   bt-actions report -o issue.md --no-values      # for others: no goal, result, input or variable
 
 Runs below a RunTree leaf that failed are told behind it, as far as they are recorded here.
 """
-_FORMS = (".md", ".json")
+_FORMS = (".md", ".json", ".html")
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -51,14 +52,14 @@ def add_parser(subparsers: Subparsers) -> None:
         help="without goals, results, inputs, variables, items and what the tree logs",
     )
     parser.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, help="file to write: .md or .json"
+        "-o", "--output", metavar="FILE", type=Path, help="file to write: .md, .json or .html"
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Read the run, and tell it."""
     if args.output is not None and args.output.suffix not in _FORMS:
-        raise BadInput(f"-o {args.output}: a report is written as .md or .json")
+        raise BadInput(f"-o {args.output}: a report is written as .md, .json or .html")
     from bt_actions.recording import report
 
     with reading(args.run) as recording:
@@ -84,6 +85,10 @@ def _write(path: Path, found: list[Report], *, full: bool) -> None:
 
     if path.suffix == ".md":
         text = "".join(f"{line}\n" for line in markdown(found, full=full))
+    elif path.suffix == ".html":
+        from bt_actions.page.report import page
+
+        text = page(found)
     else:
         text = as_json({"runs": [data(each, full=full) for each in found]}, ascii_only=True) + "\n"
     try:

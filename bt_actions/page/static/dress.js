@@ -1,13 +1,13 @@
 // Theme, sizes of panes, and the words that are shown for a moment.
 
-import { el, ICON } from "./glyphs.js";
+import { el, icon } from "./glyphs.js";
 
 const find = (id) => document.getElementById(id), page = document.documentElement;
 const kept = (name, value) => { try { if (value === undefined) return localStorage.getItem(name); localStorage.setItem(name, value); } catch { /* a page that may not keep things works all the same */ } return null; };
 
 export function dress() {
   const system = matchMedia("(prefers-color-scheme: dark)"), button = find("theme");
-  const look = (dark) => { page.dataset.theme = dark ? "dark" : "light"; button.innerHTML = dark ? ICON.sun : ICON.moon; button.setAttribute("aria-label", dark ? "Light theme" : "Dark theme"); };
+  const look = (dark) => { page.dataset.theme = dark ? "dark" : "light"; button.replaceChildren(icon(dark ? "sun" : "moon")); button.setAttribute("aria-label", dark ? "Light theme" : "Dark theme"); };
   look(kept("bt-actions-theme") ? kept("bt-actions-theme") === "dark" : system.matches);
   system.addEventListener("change", () => { if (!kept("bt-actions-theme")) look(system.matches); });
   button.addEventListener("click", () => { const dark = page.dataset.theme !== "dark"; kept("bt-actions-theme", dark ? "dark" : "light"); look(dark); });

@@ -108,7 +108,7 @@ export function create_graph(app) {
       part.was = key;
       part.group.setAttribute("class", `node ${status}${app.sel === n ? " picked" : ""}`);
       part.badge.replaceChildren();
-      if (status !== "idle") { const glyph = status_glyph(look); glyph.setAttribute("width", 14); glyph.setAttribute("height", 14); part.badge.append(svg("circle", { class: "disc", cx: 7, cy: 7, r: 10 }), glyph); }
+      if (status !== "idle") { part.badge.append(svg("circle", { class: "disc", cx: 7, cy: 7, r: 10 }), status_glyph(look, { width: 14, height: 14 })); }
       part.group.setAttribute("aria-label", `${run.nodes[n].name}, ${word}`);
       part.line?.setAttribute("class", status === "running" ? "live" : status === "failure" ? "bad" : "");
     }

@@ -42,7 +42,7 @@ export function create_head(app) {
     if (run.gap_at(app.t)) return ["Not recorded", "stopped"];
     if (s.finished?.error && !s.stop) return STATE.failure;
     if (s.finished) return { SUCCESS: STATE.success, FAILURE: STATE.failure, INVALID: ["Stopped", "stopped"] }[s.finished.status];
-    if (over && !link.ended) return ["Never finished", "stopped"];
+    if (over && !link.ended && !link.goes_on) return ["Never finished", "stopped"];
     if (s.paused) return ["Paused", "waiting"];
     if (s.stop) return ["Stopping", "cancel"];
     if (app.at_head && link.conn === "lost") return ["Was running", "running"];
@@ -72,8 +72,8 @@ export function create_head(app) {
 
   function banner(now, ago) {
     const { run, link } = app, box = find("banner");
-    const killed = now === "replay" && !link.ended && run.began ? "killed" : "", broken = link.why ? "lost" : "";
-    const tone = broken || (killed ? "stale" : now === "stale" || now === "lost" ? now : link.damaged ? "stale" : "");
+    const killed = now === "replay" && !link.ended && !link.goes_on && run.began ? "killed" : "", broken = link.why ? "lost" : "";
+    const tone = broken || (killed || link.goes_on ? "stale" : now === "stale" || now === "lost" ? now : link.damaged ? "stale" : "");
     if (box.dataset.k !== tone + now) {
       box.dataset.k = tone + now;
       box.className = tone;
@@ -83,6 +83,7 @@ export function create_head(app) {
     const last = `As of ${clock(run.clock)}`, next = Math.max(0, Math.ceil((link.next - performance.now()) / 1000));
     const hurt = link.damaged ? ` ${link.damaged} of its records ${link.damaged === 1 ? "is" : "are"} damaged: something may be missing.` : "";
     const words = broken ? `The recording cannot be read: ${link.why}`
+      : link.goes_on ? `Written while the run went on, at ${clock(run.clock)}.${hurt}`
       : killed ? `The recording ends at ${clock(run.clock)}: its process was killed, and what ran then may still run.${hurt}`
         : hurt && !["stale", "lost"].includes(now) ? `The recording:${hurt}`
         : now === "lost" ? `${last}; ${next ? `next try in ${next} s` : "trying"}. What is missed is filled in.`

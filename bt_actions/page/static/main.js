@@ -5,6 +5,7 @@
 
 import { Run } from "./store.js";
 import { Link } from "./link.js";
+import { Stored, stored } from "./stored.js";
 import { create_head } from "./head.js";
 import { create_strip } from "./strip.js";
 import { create_tree } from "./tree.js";
@@ -80,11 +81,12 @@ const app = {
     if (tell) remember();
     dirty = true;
   },
-  async fetch_runs() { try { return (await (await fetch("/runs")).json()).runs; } catch { return []; } },
+  async fetch_runs() { if (stored) return stored.map((one) => one.run); try { return (await (await fetch("/runs")).json()).runs; } catch { return []; } },
   open(id, params = new URLSearchParams()) {
     app.link?.close();
     Object.assign(app, { run: new Run(id), s: null, settled: false, grown: 0, t: 0, head: 0, at_head: true, playing: false, zoomed: null, folded: new Set(), wanted: params });
-    app.link = new Link(app.run, (what) => told(app.run, what));
+    const { run } = app;
+    app.link = new (stored ? Stored : Link)(run, (what) => told(run, what));
   },
 };
 let dirty = true, last = performance.now(), painted = 0;
@@ -164,7 +166,7 @@ async function enter() {
   const params = new URLSearchParams(location.hash.slice(1));
   if (params.has("run")) return app.open(params.get("run"), params);
   const runs = await app.fetch_runs(), [newest] = runs, live = runs.find((one) => one.written && !one.status);
-  if (newest) return app.open((live || newest).run_id, params);
+  if (newest) return app.open((!stored && live || newest).run_id, params);
   none();
   setTimeout(enter, 1000);
 }

@@ -1,7 +1,7 @@
 // The timeline: a lane for each action server, a bar for each attempt, its phases as patterns; and the cursor.
 // Time runs through `scale`, which squeezes gaps. The right end of the picture grows in steps, never by the frame.
 
-import { el, status_glyph, status_html } from "./glyphs.js";
+import { el, status_glyph } from "./glyphs.js";
 import { clock, secs, PHASE_WORD } from "./words.js";
 
 const NICE = [0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800], STEP = 15;
@@ -101,7 +101,7 @@ export function create_timeline(app) {
         const told = a.phases.findLast((p) => p.st === "exec") || a.phases.reduce((x, y) => (Math.min(y.to, head) - y.from > Math.min(x.to, head) - x.from ? y : x));
         const tx = Math.max(from, x_of(told.from)), wide = x_of(Math.min(told.to, head)) - tx - (!open && a.oc !== "SUCCEEDED" && told.to === a.done ? 9 : 0), name = a.a > 1 ? `#${a.a} ${run.nodes[a.n].name}` : run.nodes[a.n].name;
         if (wide > Math.min(40, name.length * 6 + 10)) bar.el.append(el("span", { class: told.st === "exec" ? "tx" : "tx chip", style: `left:${px(tx - from)};max-width:${px(wide)}`, text: name }));
-        if (!open && a.oc !== "SUCCEEDED") { const mark = el("span", { class: "endm sq" }); mark.innerHTML = status_html(a.oc === "CANCELED" ? "stopped" : "failure"); mark.style.right = "auto"; mark.style.left = px(x_of(a.done) - from - 7); mark.style.transform = "none"; bar.el.append(mark); }
+        if (!open && a.oc !== "SUCCEEDED") { const mark = el("span", { class: "endm sq" }, status_glyph(a.oc === "CANCELED" ? "stopped" : "failure")); mark.style.right = "auto"; mark.style.left = px(x_of(a.done) - from - 7); mark.style.transform = "none"; bar.el.append(mark); }
       });
     }
     for (const [id, bar] of bars) if (!seen.has(id)) { bar.el.remove(); bars.delete(id); }

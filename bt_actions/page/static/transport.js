@@ -1,19 +1,18 @@
 // Where in time the page stands, and what moves it: events, failures, play, live.
 
-import { el, ICON } from "./glyphs.js";
+import { el, icon } from "./glyphs.js";
 import { clock } from "./words.js";
 import { upper } from "./state.js";
 
 const find = (id) => document.getElementById(id);
 const set = (node, key, paint) => { if (node.dataset.key !== key) { node.dataset.key = key; paint(); } };
-const icon = (button, svg) => { button.innerHTML = svg; };    // of glyphs.js, which nobody else writes
 
 export function create_transport(app) {
-  for (const [id, name] of Object.entries({ "prev-fail": "prev_fail", "prev-event": "prev", "next-event": "next", "next-fail": "next_fail" })) icon(find(id), ICON[name]);
+  for (const [id, name] of Object.entries({ "prev-fail": "prev_fail", "prev-event": "prev", "next-event": "next", "next-fail": "next_fail" })) find(id).replaceChildren(icon(name));
 
   function update() {
     const { run, link } = app, live = !run.over && link.conn === "live", play = find("play"), playing = app.playing || (app.at_head && live);
-    set(play, playing ? "pause" : "play", () => { icon(play, playing ? ICON.pause : ICON.play); play.setAttribute("aria-label", playing ? "Pause" : "Play"); });
+    set(play, playing ? "pause" : "play", () => { play.replaceChildren(icon(playing ? "pause" : "play")); play.setAttribute("aria-label", playing ? "Pause" : "Play"); });
     const of = run.over || !app.at_head ? `of ${clock(app.head)}` : "";
     set(find("clock"), clock(app.t) + of, () => find("clock").replaceChildren(`${clock(app.t)} `, el("small", { text: of })));
     const go = find("go-live"), back = app.head - app.t;
