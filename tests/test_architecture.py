@@ -19,7 +19,7 @@ ROOT = Path(bt_actions.__file__).parent
 ROOMS = [
     {"cli"},
     {"page", "serving", "testing"},
-    {"recording", "render", "running", "simulation"},
+    {"importing", "recording", "render", "running", "simulation"},
     {"document"},
     {"behaviours"},
     {"wiring"},

@@ -1,5 +1,7 @@
 """How many cases of the oracle agree, by group and kind: python -m tests.support.oracle [FILE].
 
+Behind them stands how many scripts do, of its file of scripts or of `--scripts FILE`.
+
 With `--show KIND`, also the cases of that kind that differ (`any` for all).
 """
 
@@ -10,6 +12,7 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
+from tests.support.oracle import scripts
 from tests.support.oracle.cases import CASES, read
 from tests.support.oracle.comparing import difference
 from tests.support.oracle.writing import NotYet
@@ -19,6 +22,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.support.oracle")
     parser.add_argument("file", nargs="?", type=Path, default=CASES)
     parser.add_argument("--show", metavar="KIND", default="")
+    parser.add_argument("--scripts", type=Path, default=scripts.SCRIPTS)
     arguments = parser.parse_args()
     agree, differ, not_yet = Counter[str](), Counter[str](), Counter[str]()
     with tempfile.TemporaryDirectory() as directory:
@@ -35,6 +39,8 @@ def main() -> None:
                 print(case.xml, case.acts, case.conds, found, sep="\n  ")
     for row in sorted(agree | differ, key=lambda row: ("," not in row, row)):
         print(f"{row:28} {agree[row]:6} agree {differ[row]:6} differ")
+    told = [scripts.difference(each) for each in scripts.read(arguments.scripts)]
+    print(f"{'scripts':28} {told.count(''):6} agree {len(told) - told.count(''):6} differ")
     print(f"not yet, {not_yet.total()}: {', '.join(f'{w} {n}' for w, n in not_yet.most_common())}")
 
 

@@ -33,10 +33,10 @@ def difference(case: Case, file: Path) -> str:
     return ""
 
 
-def listed() -> dict[str, str]:
+def listed(file: Path = DIFFERENCES) -> dict[str, str]:
     """The cases that are known to differ, and why."""
     found, reason = {}, ""
-    for line in DIFFERENCES.read_text(encoding="utf-8").splitlines():
+    for line in file.read_text(encoding="utf-8").splitlines():
         if line.startswith(" "):
             found |= dict.fromkeys(line.split(), reason)
         elif not line.startswith("#"):
