@@ -16,6 +16,7 @@ import xml.etree.ElementTree as ET
 from pathlib import Path
 
 from bt_actions import load_tree
+from bt_actions.document.describing import nodes_of
 from bt_actions.render import dot
 from bt_actions.render.graphviz import draw
 
@@ -29,7 +30,7 @@ _PLACED |= {"x", "y"}
 
 def source(picture: Path) -> str:
     """The dot source of a picture."""
-    return dot(load_tree(PICTURES[picture]))
+    return dot(nodes_of(load_tree(PICTURES[picture])))
 
 
 def drawn(picture: Path) -> str:

@@ -22,9 +22,12 @@ from py_trees.composites import Sequence
 
 from bt_actions import MoveRobot, Retry, Timeouts, load_tree
 from bt_actions.behaviours.variables import Var
+from bt_actions.document.cards import cards_of
+from bt_actions.document.describing import nodes_of
 from bt_actions.render.graphviz import RenderError
 from bt_actions.render.look import rows
-from bt_actions.render.page import MOST_NODES, open_depth, page
+from bt_actions.render.page import MOST_NODES, open_depth
+from bt_actions.render.page import page as page_of
 
 ROOT = Path(__file__).parents[1]
 TREE = """\
@@ -82,6 +85,10 @@ class _Reader(HTMLParser):
         return dict(json.loads(self.inside["application/json"]))
 
 
+def page(root: Behaviour) -> str:
+    return page_of(nodes_of(root), cards_of(root))
+
+
 @pytest.fixture
 def tree(tmp_path: Path) -> Path:
     (path := tmp_path / "fetch.yaml").write_text(TREE)
@@ -94,7 +101,7 @@ def card(text: str, name: str) -> SimpleNamespace:
     node = next(node for node in data["nodes"] if node["name"] == name)
     tables = (data["tables"][number] for number in node["tables"])
     found = {title: {key: value for key, value, *_ in lines} for title, lines in tables}
-    return SimpleNamespace(**{"yaml": None, "place": None, **node, "tables": found})
+    return SimpleNamespace(**{**node, "tables": found})
 
 
 def actions(nodes: int) -> Iterator[Behaviour]:
@@ -163,8 +170,7 @@ def test_a_tree_made_in_python_shows_what_there_is() -> None:
 
     leaf = MoveRobot("Go", Var("there"), expect=near, save={"/at": "result.final_pose"})
     shown = card(page(leaf), "Go")
-    assert shown.yaml is None
-    assert shown.place is None
+    assert (shown.yaml, shown.place) == ("", "")
     assert shown.tables["Action"]["goal"] == "{distance: $there}"
     assert shown.tables["Action"]["expect"].endswith("near (a function)")
     assert shown.tables["Action"]["save"] == "/at: result.final_pose"
@@ -238,7 +244,7 @@ def test_the_policy_of_a_page_allows_its_own_script_and_style_only(tree: Path) -
 
 def test_the_same_tree_is_the_same_page_in_every_process(tree: Path) -> None:
     code = (
-        "import sys; from bt_actions import load_tree; from bt_actions.render.page import page;"
+        "import sys; from bt_actions import load_tree; from tests.test_page import page;"
         "load_tree(sys.argv[1]) if len(sys.argv) > 2 else None;"
         "sys.stdout.buffer.write(page(load_tree(sys.argv[1])).encode())"
     )
@@ -284,7 +290,7 @@ def test_a_large_tree_starts_folded_where_it_can_be_taken_in(
         for parent, nodes in zip(level, below, strict=True):
             parent.add_children(nodes)
         level = [node for nodes in below for node in nodes]
-    assert open_depth(list(rows(root)), 40) == depth
+    assert open_depth(list(rows(nodes_of(root))), 40) == depth
 
 
 def test_a_node_that_another_is_merged_into_shows_its_own_lines(tmp_path: Path) -> None:

@@ -13,6 +13,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.composites import Sequence
 
 from bt_actions import MoveRobot, load_tree, render
+from bt_actions.document.cards import cards_of
+from bt_actions.document.describing import nodes_of
 from tests.support import browser as chromium
 
 TREES = Path(__file__).parents[1] / "trees"
@@ -37,7 +39,7 @@ def show(window: chromium.Browser, tmp_path: Path) -> Iterator[Open]:
 
     def shown(root: Behaviour, scheme: str = "light", width: int = 1200) -> chromium.Browser:
         path = tmp_path / "tree.html"
-        render.write(root, path)
+        render.write(nodes_of(root), path, cards=cards_of(root))
         window.scheme(scheme)
         window.point(0, 0)
         window.open(path, width=width)
@@ -89,7 +91,7 @@ def focused(window: chromium.Browser) -> str:
 def test_every_node_is_drawn_in_its_shape_and_nothing_is_loaded(show: Open) -> None:
     root = sample()
     window = show(root)
-    assert names(window) == [row.node.name for row in render.rows(root)]
+    assert names(window) == [node.name for node in nodes_of(root)]
     shapes = window.run("return [...document.querySelectorAll('.shape')].map((one) => one.tagName)")
     assert shapes[:3] == ["polygon", "rect", "ellipse"]
     assert window.run("return performance.getEntriesByType('resource').length") == 0
@@ -255,7 +257,7 @@ def test_a_tree_with_a_script_for_a_name_does_nothing(show: Open) -> None:
 def test_the_policy_stops_a_script_that_is_not_the_page_s_own(
     window: chromium.Browser, tmp_path: Path
 ) -> None:
-    text = render.content(sample(), "html").decode()
+    text = render.content(nodes_of(sample()), "html").decode()
     (path := tmp_path / "tree.html").write_text(
         text.replace("</header>", "</header><img src=x onerror=window.pwned=1>")
     )

@@ -21,6 +21,8 @@ from py_trees.composites import Parallel, Selector, Sequence
 from py_trees.decorators import Inverter
 
 from bt_actions import load_tree, render
+from bt_actions.behaviours.kinds import kind
+from bt_actions.document.describing import nodes_of
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -68,22 +70,22 @@ def test_a_parallel_says_how_many_children_must_succeed(
     children = "[{success: }, {success: }, {success: }]"
     path.write_text(f"tree: t\nroot: {{parallel: Both, {policy}children: {children}}}\n")
     root = load_tree(path)
-    assert render.kind(root) == words
-    assert f"Both  ({words})" in render.text(root)
+    assert kind(root) == words
+    assert f"Both  ({words})" in render.text(nodes_of(root))
 
 
 def test_levels_that_are_left_out_are_counted(root: Behaviour) -> None:
-    assert render.text(root, depth=1).splitlines() == [
+    assert render.text(nodes_of(root), depth=1).splitlines() == [
         "{o} Deliver",
         "├─ {-} Pick  + 2 more",
         "├─ [-] React  + 2 more",
         "└─ /_/ Both  (parallel, all)  + 2 more",
     ]
-    assert render.text(root, depth=0) == "{o} Deliver  + 9 more\n"
-    assert render.text(root, depth=3) == render.text(root)
-    drawn = render.dot(root, depth=1)
+    assert render.text(nodes_of(root), depth=0) == "{o} Deliver  + 9 more\n"
+    assert render.text(nodes_of(root), depth=3) == render.text(nodes_of(root))
+    drawn = render.dot(nodes_of(root), depth=1)
     assert (drawn.count("[shape="), drawn.count("+ 2 more"), drawn.count("->")) == (4, 3, 3)
-    assert render.dot(root, depth=3) == render.dot(root)
+    assert render.dot(nodes_of(root), depth=3) == render.dot(nodes_of(root))
 
 
 def wide_tree(nodes: int, children: int = 6) -> Behaviour:
@@ -100,7 +102,7 @@ def wide_tree(nodes: int, children: int = 6) -> Behaviour:
 
 
 def test_text_shows_each_node_once_under_its_parent(root: Behaviour) -> None:
-    assert render.text(root).splitlines() == [
+    assert render.text(nodes_of(root)).splitlines() == [
         "{o} Deliver",
         "├─ {-} Pick",
         "│  ├─ --> To the part  (move_robot: MoveRobot)",
@@ -118,11 +120,11 @@ def test_text_shows_each_node_once_under_its_parent(root: Behaviour) -> None:
 def test_text_for_an_encoding_without_box_characters_is_ascii(
     root: Behaviour, encoding: str
 ) -> None:
-    assert render.text(root, encoding=encoding).isascii()
+    assert render.text(nodes_of(root), encoding=encoding).isascii()
 
 
 def test_dot_gives_py_trees_shapes_and_shows_server_and_type_of_an_action(root: Behaviour) -> None:
-    dot = render.dot(root)
+    dot = render.dot(nodes_of(root))
     for shape, name in [
         ("octagon", "Deliver"),
         ("box", "Pick"),
@@ -139,13 +141,13 @@ def test_dot_gives_py_trees_shapes_and_shows_server_and_type_of_an_action(root: 
     "name", ['a "b" <c> & d', "back\\slash", "bell\x07 and\nbreak", "ünï 日本"]
 )
 def test_any_name_can_be_drawn(name: str) -> None:
-    drawing = ET.fromstring(render.content(Sequence(name, memory=True), "svg"))
+    drawing = ET.fromstring(render.content(nodes_of(Sequence(name, memory=True)), "svg"))
     shown = "".join(text.text or "" for text in drawing.iter(f"{SVG}text"))
     assert re.sub(r"[\s\x07]", "", name) in re.sub(r"\s", "", shown)
 
 
 def test_svg_holds_every_name_and_centres_each_in_its_shape(root: Behaviour) -> None:
-    drawing = ET.fromstring(render.content(root, "svg"))
+    drawing = ET.fromstring(render.content(nodes_of(root), "svg"))
     texts = [text.text for text in drawing.iter(f"{SVG}text")]
     assert {node.name for node in root.iterate()} <= set(texts)
     assert {text.get("text-anchor") for text in drawing.iter(f"{SVG}text")} == {"middle"}
@@ -156,7 +158,7 @@ def test_svg_holds_every_name_and_centres_each_in_its_shape(root: Behaviour) -> 
 
 
 def test_png_is_a_png_of_some_size(root: Behaviour) -> None:
-    width, height = png_size(render.content(root, "png"))
+    width, height = png_size(render.content(nodes_of(root), "png"))
     assert width > 600
     assert height > 200
 
@@ -170,9 +172,9 @@ def png_size(data: bytes) -> tuple[int, int]:
 def test_drawing_needs_no_dot_on_the_path_and_imports_no_rclpy(tmp_path: Path) -> None:
     code = (
         "import sys; from pathlib import Path; from py_trees.composites import Sequence;"
-        "from bt_actions import render;"
-        "render.write(Sequence('s', memory=True), Path('a.png'));"
-        "render.write(Sequence('s', memory=True), Path('a.svg'));"
+        "from bt_actions import render; from bt_actions.document.describing import nodes_of;"
+        "render.write(nodes_of(Sequence('s', memory=True)), Path('a.png'));"
+        "render.write(nodes_of(Sequence('s', memory=True)), Path('a.svg'));"
         "sys.exit('rclpy' in sys.modules)"
     )
     checkout = Path(__file__).parent.parent
@@ -187,7 +189,7 @@ def test_drawing_needs_no_dot_on_the_path_and_imports_no_rclpy(tmp_path: Path) -
 @pytest.mark.parametrize("form", render.FORMATS)
 def test_a_tree_of_1000_nodes_is_drawn_in_every_format(form: str, tmp_path: Path) -> None:
     path = tmp_path / f"tree.{form}"
-    render.write(wide_tree(1000), path)
+    render.write(nodes_of(wide_tree(1000)), path)
     assert path.stat().st_size > 10_000
     if form == "png":
         assert max(png_size(path.read_bytes())) < 32_768
@@ -200,21 +202,21 @@ def test_a_chain_deeper_than_the_recursion_limit_is_drawn() -> None:
         child = Sequence(str(number), memory=True)
         last.add_child(child)
         last = child
-    assert len(render.text(root).splitlines()) == 3000
-    assert render.dot(root).count(" -> ") == 2999
+    assert len(render.text(nodes_of(root)).splitlines()) == 3000
+    assert render.dot(nodes_of(root)).count(" -> ") == 2999
 
 
 def test_a_png_too_small_to_read_is_refused_with_a_way_out() -> None:
     large = wide_tree(10_000)
     with pytest.raises(render.RenderError, match=r"fewer levels of it \(--depth\)"):
-        render.content(large, "png")
-    assert render.content(large, "png", depth=2).startswith(b"\x89PNG")
+        render.content(nodes_of(large), "png")
+    assert render.content(nodes_of(large), "png", depth=2).startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("name", ["tree.pdf", "tree", ".svg", "tree.svg.gz"])
 def test_an_unknown_suffix_is_an_error_that_names_the_known_ones(name: str, tmp_path: Path) -> None:
     with pytest.raises(render.RenderError, match=r"\.txt, \.dot, \.svg, \.png, \.html"):
-        render.write(Sequence("s", memory=True), tmp_path / name)
+        render.write(nodes_of(Sequence("s", memory=True)), tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -223,6 +225,6 @@ def test_without_pygraphviz_text_and_dot_still_work(
 ) -> None:
     monkeypatch.setitem(sys.modules, "pygraphviz", None)
     with pytest.raises(render.RenderError, match="pip install pygraphviz"):
-        render.content(root, "svg")
-    assert render.content(root, "txt")
-    assert render.content(root, "dot")
+        render.content(nodes_of(root), "svg")
+    assert render.content(nodes_of(root), "txt")
+    assert render.content(nodes_of(root), "dot")

@@ -10,11 +10,21 @@ from py_trees.behaviour import Behaviour
 from bt_actions import document
 from bt_actions.behaviours.action import ActionBehaviour
 from bt_actions.behaviours.kinds import action_of, kind
+from bt_actions.behaviours.places import in_order
 from bt_actions.events.kinds import Node
 from bt_actions.events.snapshot import Value
 from bt_actions.messages.fields import constants
 
 _PHASES = ("queue", "server", "accept", "result", "feedback", "cancel")
+
+
+def nodes_of(root: Behaviour) -> tuple[Node, ...]:
+    """Return what is told of each node of a tree, as a run of it would begin."""
+    numbers = {node: number for number, node in enumerate(in_order(root), 1)}
+    return tuple(
+        describe(node, number, numbers[node.parent] if node is not root and node.parent else None)
+        for node, number in numbers.items()
+    )
 
 
 def describe(node: Behaviour, number: int, parent: int | None, index: int | None = None) -> Node:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.resources import files
 from typing import Any
 
 from bt_actions.events.bare import bare
 from bt_actions.events.wire import to_plain
 from bt_actions.page.feed import known
+from bt_actions.page.static_files import static_files
 from bt_actions.recording.reading import Item, Recording
 from bt_actions.recording.report import Report
 from bt_actions.render.one_file import data_text, policy, script
@@ -21,8 +21,7 @@ def page(found: Sequence[Report]) -> str:
 
     Raises RecordingError.
     """
-    static = files(__package__).joinpath("static")
-    texts = {each.name: each.read_text("utf-8") for each in static.iterdir()}
+    texts = static_files()
     modules = {name[:-3]: text for name, text in texts.items() if name.endswith(".js")}
     code, style = script("main", modules), texts["style.css"]
     data = data_text([_run(each) for each in found])

@@ -9,7 +9,6 @@ import contextlib
 import socket
 from collections.abc import Callable
 from dataclasses import asdict
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -23,6 +22,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from bt_actions.page.feed import message, told
+from bt_actions.page.static_files import static_files
 from bt_actions.recording.folders import Recorded, Summary, is_written, read_summary, recorded
 
 PORT = 8650
@@ -102,9 +102,7 @@ def server_of(given: Path | None = None) -> uvicorn.Server:
 
 
 def _application(given: Path | None, closing: Callable[[], bool]) -> ASGIApp:
-    static = {
-        each.name: each.read_bytes() for each in files(__package__).joinpath("static").iterdir()
-    }
+    static = {name: text.encode() for name, text in static_files().items()}
 
     def page(request: Request) -> Response:
         name = request.path_params.get("name", "index.html")

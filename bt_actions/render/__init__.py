@@ -3,18 +3,18 @@
 Layout and drawing of SVG and PNG use the Graphviz libraries inside the pygraphviz wheel, in this
 process: no `dot` on the PATH. The page is made in page.py.
 
-Never ticks, sets up or changes a tree, and never imports rclpy.
+A tree is given as the values that the first event of a run has of its nodes: of a recorded run, or
+of a tree that is loaded (`bt_actions.document.describing.nodes_of`).
 """
 
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from py_trees.behaviour import Behaviour
-
-from bt_actions.behaviours.kinds import action_of, kind
-from bt_actions.document import place_of
+from bt_actions.events import Node
 from bt_actions.render.graphviz import RenderError, draw
 from bt_actions.render.look import (
     DOWN_UP_TO,
@@ -29,16 +29,17 @@ from bt_actions.render.outline import text
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.whole_file import replace_file
 
+if TYPE_CHECKING:
+    from bt_actions.document.cards import Card
+
 __all__ = [
     "DOWN_UP_TO",
     "FORMATS",
     "NodeRow",
     "RenderError",
-    "action_of",
     "content",
     "dot",
     "form_of",
-    "kind",
     "rows",
     "text",
     "write",
@@ -54,49 +55,53 @@ _STYLE = (
 )
 
 
-def dot(root: Behaviour, *, direction: str | None = None, depth: int | None = None) -> str:
-    """Return `root` in Graphviz' dot language.
+def dot(nodes: Sequence[Node], *, direction: str | None = None, depth: int | None = None) -> str:
+    """Return a tree in Graphviz' dot language.
 
     `direction` is "down" or "right"; None chooses by the number of leaves. With `depth`, only so
     many levels below the root.
     """
-    nodes = list(rows(root, depth=depth))
+    shown = list(rows(nodes, depth=depth))
     lines = [
-        f"digraph {_quoted(root.name)} {{",
-        f"  rankdir={'TB' if direction_of(nodes, direction) == 'down' else 'LR'};",
+        f"digraph {_quoted(nodes[0].name)} {{",
+        f"  rankdir={'TB' if direction_of(shown, direction) == 'down' else 'LR'};",
         *_STYLE,
     ]
-    numbers = {id(row.node): number for number, row in enumerate(nodes)}
-    for number, row in enumerate(nodes):
-        shape, fill = look(row.node)
+    numbers = {row.node.id: number for number, row in enumerate(shown)}
+    for number, row in enumerate(shown):
+        shape, fill = look(row)
         lines.append(
             f'  n{number} [shape={shape}, fillcolor="{fill}", '
             f"label=<{_label(row)}>, tooltip={_quoted(_tooltip(row.node))}];"
         )
-        parent = row.node.parent
-        if row.depth and parent is not None:
-            lines.append(f"  n{numbers[id(parent)]} -> n{number};")
+        if row.node.parent is not None:
+            lines.append(f"  n{numbers[row.node.parent]} -> n{number};")
     return "\n".join([*lines, "}", ""])
 
 
 def content(
-    root: Behaviour, form: str, *, direction: str | None = None, depth: int | None = None
+    nodes: Sequence[Node],
+    form: str,
+    *,
+    direction: str | None = None,
+    depth: int | None = None,
+    cards: Sequence[Card] = (),
 ) -> bytes:
-    """Return the bytes of a file of `root` in one of FORMATS.
+    """Return the bytes of a file of a tree in one of FORMATS; a page shows the nodes' cards, too.
 
     With `depth`, only so many levels below the root; a page has all of them, and starts folded.
     Raises RenderError for any other format, and when it cannot be drawn.
     """
     if form == "txt":
-        return text(root, depth=depth).encode()
+        return text(nodes, depth=depth).encode()
     if form == "dot":
-        return dot(root, direction=direction, depth=depth).encode()
+        return dot(nodes, direction=direction, depth=depth).encode()
     if form == "html":
         from bt_actions.render.page import page  # here: few calls want one, all load this file
 
-        return page(root, direction=direction, depth=depth).encode()
+        return page(nodes, cards, direction=direction, depth=depth).encode()
     if form in FORMATS:
-        return draw(dot(root, direction=direction, depth=depth), form)
+        return draw(dot(nodes, direction=direction, depth=depth), form)
     raise RenderError(f"unknown format {form!r}; there are {', '.join(FORMATS)}")
 
 
@@ -113,13 +118,18 @@ def form_of(path: Path) -> str:
 
 
 def write(
-    root: Behaviour, path: Path, *, direction: str | None = None, depth: int | None = None
+    nodes: Sequence[Node],
+    path: Path,
+    *,
+    direction: str | None = None,
+    depth: int | None = None,
+    cards: Sequence[Card] = (),
 ) -> None:
-    """Write `root` to `path` in the format of its suffix: the whole file, or no change.
+    """Write a tree to `path` in the format of its suffix: the whole file, or no change.
 
     Raises RenderError when the suffix is unknown, or the file cannot be drawn or written.
     """
-    data = content(root, form_of(path), direction=direction, depth=depth)
+    data = content(nodes, form_of(path), direction=direction, depth=depth, cards=cards)
     try:
         replace_file(path, data)
     except OSError as error:
@@ -133,11 +143,9 @@ def _label(row: NodeRow) -> str:
     return f'{large}<br/><font point-size="8.5">{small}</font>'
 
 
-def _tooltip(node: Behaviour) -> str:
-    place = place_of(node)
-    if place is None:
-        return clean(node.name)
-    return f"{clean(node.name)} ({Path(place.file).name}:{place.line})"
+def _tooltip(node: Node) -> str:
+    file, _, line = node.place.rpartition(":")[0].rpartition(":")
+    return f"{clean(node.name)} ({Path(file).name}:{line})" if file else clean(node.name)
 
 
 def _quoted(name: str) -> str:

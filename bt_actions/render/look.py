@@ -1,63 +1,65 @@
 """The look of a node, for every picture and page of a tree: words, shape, colours.
 
-Shapes are py_trees' own (octagon: fallback, box: sequence, parallelogram: parallel, ellipse:
-decorators and leaves). Draws and lays out nothing, never changes a tree, imports no rclpy.
+static/looks.js holds the table, and says the same of a node to a page. Draws and lays out nothing.
 """
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Iterable, Iterator
+import json
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
 
-from py_trees.behaviour import Behaviour
-from py_trees.composites import Composite, Parallel, Selector, Sequence
-from py_trees.decorators import Decorator
-
-from bt_actions.behaviours.kinds import action_of, kind
+from bt_actions.events import Node
 from bt_actions.utilities.plain_text import clean
 
 DOWN_UP_TO = 16
 """Leaves up to which a picture grows down, as py_trees draws; a wider one grows to the right."""
-
-_LABEL_WIDTH = 28
-_LOOKS = (
-    (Selector, "octagon", "#8ee3ea"),
-    (Sequence, "box", "#ffc46b"),
-    (Parallel, "parallelogram", "#ffe070"),
-    ((Composite, Decorator), "ellipse", "#f4f4fc"),
-    (Behaviour, "ellipse", "#d4d8dd"),
-)
+COMPOSITES = ("sequence", "fallback", "parallel")
+STATIC = Path(__file__).parent / "static"
+"""The modules that a drawn tree and the page of a run share."""
 
 
 @dataclass(frozen=True, slots=True)
 class NodeRow:
     """One node of a tree in reading order."""
 
-    node: Behaviour
+    node: Node
     depth: int
     branches: tuple[bool, ...]
     """For each level below the root: does the line go on below this node?"""
-    folded: int = 0
-    """Nodes below this one that are left out."""
+    below: int
+    """Nodes below this one."""
+    is_folded: bool = False
+    """Whether these are left out."""
 
 
-def rows(root: Behaviour, *, depth: int | None = None) -> Iterator[NodeRow]:
-    """Yield every node below and including `root`, parents first; not bounded by recursion.
+def rows(nodes: Sequence[Node], *, depth: int | None = None) -> Iterator[NodeRow]:
+    """Yield every node in reading order, parents first; not bounded by recursion.
 
-    With `depth`, only nodes of so many levels below the root; who has more below tells how many.
+    `nodes` are those of a RunBegan, parents first. With `depth`, only nodes of so many levels below
+    the root; one that has more below tells how many.
     """
-    waiting = [NodeRow(root, 0, ())]
+    children: dict[int | None, list[Node]] = {}
+    for node in nodes:
+        children.setdefault(node.parent, []).append(node)
+    below = dict.fromkeys((node.id for node in nodes), 0)
+    for node in reversed(nodes):
+        if node.parent is not None:
+            below[node.parent] += below[node.id] + 1
+    waiting = [NodeRow(nodes[0], 0, (), below[nodes[0].id])]
     while waiting:
         row = waiting.pop()
         if row.depth == depth:
-            yield replace(row, folded=sum(1 for _ in rows(row.node)) - 1)
+            yield replace(row, is_folded=row.below > 0)
             continue
         yield row
-        last = len(row.node.children) - 1
+        inner = children.get(row.node.id, [])
         waiting.extend(
-            NodeRow(child, row.depth + 1, (*row.branches, index != last))
-            for index, child in reversed(list(enumerate(row.node.children)))
+            NodeRow(child, row.depth + 1, (*row.branches, child is not inner[-1]), below[child.id])
+            for child in reversed(inner)
         )
 
 
@@ -65,24 +67,50 @@ def direction_of(nodes: Iterable[NodeRow], direction: str | None = None) -> str:
     """Return "down" or "right": `direction` itself, or by the number of leaves where it is None."""
     if direction is not None:
         return direction
-    return "down" if sum(not row.node.children for row in nodes) <= DOWN_UP_TO else "right"
+    leaves = sum(row.is_folded or not row.below for row in nodes)
+    return "down" if leaves <= DOWN_UP_TO else "right"
 
 
 def left_out(row: NodeRow) -> str:
     """Return what a picture says of the nodes below `row` that it does not show, or nothing."""
-    return f"+ {row.folded:,} more" if row.folded else ""
+    return f"+ {row.below:,} more" if row.is_folded else ""
 
 
-def label(node: Behaviour) -> tuple[list[str], list[str]]:
+def label(node: Node) -> tuple[list[str], list[str]]:
     """Return the lines of a node's name, and the smaller ones below: its kind, or its action."""
-    name = clean(node.name) or " "
-    action = action_of(node)
-    under = [kind(node)] if action is None else list(action)
-    return textwrap.wrap(name, _LABEL_WIDTH) or [name], [clean(line) for line in under if line]
+    lines, most = [""], table()["letters"]
+    for word in clean(node.name).split():
+        for at in range(0, len(word), most):
+            part = word[at : at + most]
+            line = f"{lines[-1]} {part}".strip()
+            if len(line) > most or at:
+                lines.append(part)
+            else:
+                lines[-1] = line
+    under = [node.server, node.action] if node.server else [node.kind]
+    return lines, [clean(line) for line in under if line]
 
 
-def look(node: Behaviour) -> tuple[str, str]:
+def word_of(node: Node) -> str:
+    """Return what kind of composite a node is, one of COMPOSITES; of any other node its kind."""
+    return node.kind.removeprefix("reactive ").partition(",")[0]
+
+
+def look(row: NodeRow) -> tuple[str, str]:
     """Return the shape of a node, as py_trees draws it, and its fill, lightened."""
-    if action_of(node) is not None:
-        return "ellipse", "#bfd7ff"
-    return next((shape, fill) for kinds, shape, fill in _LOOKS if isinstance(node, kinds))
+    word = word_of(row.node)
+    if row.node.server:
+        name = "action"
+    elif word in COMPOSITES:
+        name = word
+    else:
+        name = "decorator" if row.below else "leaf"
+    found = table()["looks"][name]
+    return found["shape"], found["fill"]
+
+
+@lru_cache
+def table() -> Any:
+    """Return the table of looks."""
+    text = (STATIC / "looks.js").read_text("utf-8").partition("TABLE = ")[2]
+    return json.JSONDecoder().raw_decode(text)[0]

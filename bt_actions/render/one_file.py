@@ -26,9 +26,10 @@ def script(main: str, modules: Mapping[str, str]) -> str:
 
     def add(name: str) -> None:
         text = modules[name]
-        for imported in _IMPORT.finditer(text):
-            if imported[2] not in done:
-                add(imported[2])
+        for imported, other in _IMPORT.findall(text):
+            assert set(imported.split(", ")) <= set(_EXPORT.findall(modules[other])), other
+            if other not in done:
+                add(other)
         names = ", ".join(_EXPORT.findall(text))
         body = _EXPORT.sub("", _IMPORT.sub(r"const { \1 } = $\2;", text))
         done[name] = f"const ${name} = (() => {{\n{body}\nreturn {{ {names} }};\n}})();\n"

@@ -1,65 +1,50 @@
-// What the reader of a page sees and does: the drawing of what page_layout.js has laid out, the card of
-// the node that is pointed at or focused, folding, searching. Everything from the tree is set as text
-// or as a number, never as markup. Loads and stores nothing.
+// What the reader of a drawn tree sees and does: folding, searching, the card of the node that is pointed at or focused.
+// Everything from the tree is set as text or as a number, never as markup. Loads and stores nothing.
 
-const SVG = "http://www.w3.org/2000/svg";
+import { svg } from "./dom.js";
+import { edge, lay_out, visible } from "./layout.js";
+import { group_of, movable } from "./drawing.js";
+import { fill } from "./card.js";
+
 const LINGER = 200;                               // ms that a card outlives the pointer
 const find = (id) => document.getElementById(id);
-const view = find("view"), svg = find("tree"), card = find("card");
+const view = find("view"), picture = find("tree"), card = find("card");
+const data = JSON.parse(find("data").textContent), { nodes, down } = data;
+const how = { down, is_open: (node) => node.open };
+
+// `nodes` are in reading order: a parent comes before its children.
+nodes.forEach((node, index) => {
+  const parent = nodes[node.parent];
+  Object.assign(node, { index, depth: parent ? parent.depth + 1 : 0, children: [] });
+  node.place_in = parent ? parent.children.push(node) : 1;
+  node.words = [node.name, node.kind, node.server, node.type, node.place || ""].join("\n").toLowerCase();
+});
+for (let index = nodes.length - 1; index >= 0; index--) {
+  const node = nodes[index];
+  node.below = node.children.reduce((sum, child) => sum + child.below + 1, 0);
+}
 
 // The drawing.
 
-const make = (name, attributes, parent) => {
-  const element = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-  parent?.append(element);
-  return element;
-};
 let scale = 1, size = [0, 0], offset = [0, 0], drawn = [], current = nodes[0], hovered = null, shut = true, hits = [];
 
 function draw() {
-  drawn = visible();
-  size = lay_out(drawn);
-  const edges = [], groups = [];
-  drawn.forEach((node) => {
-    groups.push(group_of(node));
-    if (node.index) edges.push(make("path", { d: edge(nodes[node.parent], node) }));
-  });
-  find("edges").replaceChildren(...edges);
-  find("nodes").replaceChildren(...groups);
+  drawn = visible(nodes, how.is_open);
+  size = lay_out(drawn, how);
+  find("edges").replaceChildren(...drawn.slice(1).map((node) => svg("path", { d: edge(nodes[node.parent], node, down) })));
+  find("nodes").replaceChildren(...drawn.map((node) => {
+    const group = group_of(node, how), attributes = {
+      id: `n${node.index}`, role: "treeitem", tabindex: node === current ? 0 : -1,
+      "aria-level": node.depth + 1, "aria-posinset": node.place_in,
+      "aria-setsize": node.index ? nodes[node.parent].children.length : 1,
+      "aria-label": [node.name, ...(node.under[0] === node.kind ? node.under : [node.kind, ...node.under])].join(", "),
+    };
+    if (node.children.length) attributes["aria-expanded"] = node.open;
+    for (const [key, value] of Object.entries(attributes)) group.setAttribute(key, value);
+    return group;
+  }));
   resize();
   mark();
-}
-
-function group_of(node) {
-  const group = make("g", {
-    class: "node", transform: `translate(${node.x} ${node.y})`,
-    id: `n${node.index}`, role: "treeitem", tabindex: node === current ? 0 : -1,
-    "aria-level": node.depth + 1, "aria-posinset": node.place_in,
-    "aria-setsize": node.index ? nodes[node.parent].children.length : 1,
-    "aria-label": [node.name, ...(node.under[0] === node.kind ? node.under : [node.kind, ...node.under])].join(", "),
-  });
-  const [name, attributes] = outline(node);
-  make(name, { class: "shape", fill: node.fill, ...attributes }, group);
-  let y = -node.text_h / 2;
-  const write = (line, kind, height) => {
-    make("text", { class: kind, y: y + height }, group).textContent = line;
-    y += height * LINE;
-  };
-  node.lines.forEach((line) => write(line, "name", NAME));
-  node.under.forEach((line) => write(line, "under", UNDER));
-  if (node.children.length) {
-    group.setAttribute("aria-expanded", node.open);
-    const label = node.open ? "\u2212" : `+${node.below}`;
-    const half = Math.max(8, label.length * 3.2 + 4);
-    const [x, y] = down ? [0, node.h / 2 + 8] : [(node.w - node.slant) / 2 + half, 0];
-    const fold = make("g", { class: "fold", "aria-hidden": "true", transform: `translate(${x} ${y})` }, group);
-    const [left, top] = down ? [-half - 4, -8] : [-half, -12];
-    make("rect", { class: "area", x: left, y: top, width: 2 * half + (down ? 8 : 4), height: 24 }, fold);
-    make("rect", { class: "knob", x: -half, y: -8, width: 2 * half, height: 16, rx: 8 }, fold);
-    make("text", { y: 3.5 }, fold).textContent = label;
-  }
-  return group;
 }
 
 const element = (node) => find(`n${node.index}`);
@@ -75,16 +60,16 @@ function mark() {
 
 function resize() {
   const [w, h] = size;
-  svg.setAttribute("viewBox", `0 0 ${w} ${h}`);
-  svg.setAttribute("width", w * scale);
-  svg.setAttribute("height", h * scale);
+  picture.setAttribute("viewBox", `0 0 ${w} ${h}`);
+  picture.setAttribute("width", w * scale);
+  picture.setAttribute("height", h * scale);
 }
 
 // Change the size, or fold, and keep one point of the picture where the reader looks at it.
 
 function keeping(point, change) {
   const place = () => {
-    const box = svg.getBoundingClientRect(), [x, y] = point();
+    const box = picture.getBoundingClientRect(), [x, y] = point();
     return [box.left + x * scale, box.top + y * scale];
   };
   const [x, y] = place(), moved = () => { const [new_x, new_y] = place(); return [new_x - x, new_y - y]; };
@@ -96,11 +81,11 @@ function keeping(point, change) {
 
 function shift(x, y) {
   offset = [Math.max(0, x), Math.max(0, y)];
-  svg.style.margin = `${offset[1]}px 0 0 ${offset[0]}px`;
+  picture.style.margin = `${offset[1]}px 0 0 ${offset[0]}px`;
 }
 
 function zoom(factor, x, y) {
-  const box = svg.getBoundingClientRect(), frame = view.getBoundingClientRect();
+  const box = picture.getBoundingClientRect(), frame = view.getBoundingClientRect();
   const at = [
     ((x ?? frame.left + frame.width / 2) - box.left) / scale,
     ((y ?? frame.top + frame.height / 2) - box.top) / scale,
@@ -150,42 +135,12 @@ function present(node, focus) {
 
 // The card.
 
-const put = (name, parent, text, kind) => {
-  const made = document.createElement(name);
-  if (text !== undefined) made.textContent = text;
-  if (kind) made.className = kind;
-  parent.append(made);
-  return made;
-};
-
-function fill(node) {
-  card.replaceChildren();
-  card.scrollTop = 0;
-  card.setAttribute("aria-label", `About ${node.name}`);
-  put("span", put("h2", card, `${node.name} `), node.kind, "kind");
-  const path = [];
-  for (let above = node; above; above = nodes[above.parent]) path.unshift(above.name);
-  put("p", card, path.length > 12 ? [...path.slice(0, 4), "…", ...path.slice(-7)].join(" / ") : path.join(" / "));
-  if (node.place) put("code", put("p", card), node.place);
-  if (node.yaml) put("pre", card, node.yaml);
-  node.tables.forEach((number) => {
-    const [title, lines] = data.tables[number], table = put("table", card);
-    put("caption", table, title);
-    lines.forEach(([key, value, indent]) => {
-      const row = put("tr", table), head = put("th", row, key);
-      head.scope = "row";
-      head.style.paddingLeft = `${indent * 12}px`;
-      put("td", row, value);
-    });
-  });
-}
-
 let filled = null;
 function show() {
   const node = hovered || (shut ? null : current);
   card.hidden = !node || !drawn.includes(node);
   if (!card.hidden) {
-    if (filled !== node) fill(node);
+    if (filled !== node) fill(card, node, nodes, data.tables);
     filled = node;
     const box = element(node).querySelector(".shape").getBoundingClientRect(), gap = 14;
     const wide = document.documentElement.clientWidth, high = document.documentElement.clientHeight;
@@ -210,7 +165,7 @@ function hover(node) {
 }
 document.addEventListener("pointermove", (event) => {
   const where = `${event.clientX} ${event.clientY}`;  // a scroll under a pointer at rest is no move
-  if (event.pointerType === "touch" || where === pointer || grip) return;
+  if (event.pointerType === "touch" || where === pointer || view.classList.contains("dragged")) return;
   pointer = where;
   hover(card.contains(event.target) ? hovered : node_at(event.target));
 });
@@ -218,7 +173,6 @@ document.documentElement.addEventListener("pointerleave", () => hover(null));
 
 // Pointer: a click on a knob folds, on a node keeps its card, on the ground closes it; a drag moves.
 
-let grip = null;
 view.addEventListener("click", (event) => {
   const node = node_at(event.target);
   if (node) {
@@ -235,28 +189,7 @@ view.addEventListener("dblclick", (event) => {
   const node = node_at(event.target);
   if (node && !event.target.closest(".fold")) { toggle(node); go_to(node); show(); }
 });
-view.addEventListener("pointerdown", (event) => {
-  if (event.pointerType !== "mouse" || event.button || node_at(event.target)) return;
-  const box = view.getBoundingClientRect();
-  if (event.clientX > box.left + view.clientWidth || event.clientY > box.top + view.clientHeight) return; // scroll bars
-  grip = [event.clientX, event.clientY];
-  view.classList.add("dragged");
-  view.setPointerCapture(event.pointerId);
-});
-view.addEventListener("pointermove", (event) => {
-  if (!grip) return;
-  view.scrollBy(grip[0] - event.clientX, grip[1] - event.clientY);
-  grip = [event.clientX, event.clientY];
-});
-["pointerup", "pointercancel"].forEach((name) => view.addEventListener(name, () => {
-  grip = null;
-  view.classList.remove("dragged");
-}));
-view.addEventListener("wheel", (event) => {
-  if (!event.ctrlKey) return;
-  event.preventDefault();
-  zoom(Math.exp(-event.deltaY / 300), event.clientX, event.clientY);
-}, { passive: false });
+movable(view, zoom);
 view.addEventListener("scroll", () => { if (!card.hidden) show(); }, { passive: true });
 window.addEventListener("resize", () => {  // a phone that is turned, or opens its keyboard
   show();
@@ -265,7 +198,7 @@ window.addEventListener("resize", () => {  // a phone that is turned, or opens i
 
 // Keyboard, as the pattern for trees has it (WAI-ARIA).
 
-svg.addEventListener("keydown", (event) => {
+picture.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   const at = drawn.indexOf(current), { children, open, parent } = current;
   const keys = {
@@ -322,7 +255,7 @@ find("query").addEventListener("keydown", (event) => {
 });
 
 function refold(depth) {
-  fold_at(depth);
+  for (const node of nodes) node.open = node.depth < depth;
   current = nodes[0];
   shut = true;
   draw();

@@ -23,6 +23,7 @@ from bt_actions.document import (
     load_tree,
     source_of,
 )
+from bt_actions.document.describing import nodes_of
 from bt_actions.document.reading.inputs import parse_input
 from bt_actions.document.reading.workspace import MAX_LEVELS
 from bt_actions.document.yaml.source import MAX_BYTES, MAX_ERRORS
@@ -278,8 +279,8 @@ def test_the_deepest_tree_that_is_allowed_runs_and_is_drawn_from_deep_within_a_p
         tree.tick()
         assert root.status is Status.RUNNING
         assert root.tip() is not None
-        assert "Wait" in render.text(root)
-        assert "Wait" in render.dot(root)
+        assert "Wait" in render.text(nodes_of(root))
+        assert "Wait" in render.dot(nodes_of(root))
         root.stop(Status.INVALID)
         tree.shutdown()
 

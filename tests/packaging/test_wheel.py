@@ -81,10 +81,11 @@ def test_modules_the_page_the_lease_and_the_mark_of_a_typed_package_are_in_the_w
         pytest.skip("an editable install points at the sources")
     package = ROOT / "bt_actions"
     sources = {str(path.relative_to(ROOT)) for path in package.rglob("*.py")}
-    page = {str(path.relative_to(ROOT)) for path in package.glob("render/page*.*")}
-    page |= {str(path.relative_to(ROOT)) for path in package.glob("page/static/*")}
-    assert {Path(path).suffix for path in page} == {".py", ".html", ".css", ".js"}
-    assert "bt_actions/page/static/main.js" in page
+    page = {str(path.relative_to(ROOT)) for path in package.glob("*/static/*")}
+    page |= {
+        f"bt_actions/render/{name}" for name in ("page.html", "page.css", "page.js", "card.js")
+    }
+    assert {"bt_actions/page/static/main.js", "bt_actions/render/static/layout.js"} <= page
     others = {"bt_actions/py.typed", str(SHORT_LEASE.relative_to(ROOT))}
     others |= {
         f"bt_actions/packages/{name}" for name in ("build_environment.txt", "ros_wheels.cmake")

@@ -65,16 +65,22 @@ def run(args: argparse.Namespace) -> int:
     """Draw the tree that `args` name."""
     keep_results_apart()
     from bt_actions import render
+    from bt_actions.document.describing import nodes_of
 
     try:
         if args.output is not None:
             render.form_of(args.output)  # before the tree: the cheaper mistake first
         root = load(args.tree, args.set, python=args.python)
         if args.output is not None:
-            render.write(root, args.output, direction=args.direction, depth=args.depth)
+            from bt_actions.document.cards import cards_of
+
+            cards = cards_of(root) if args.output.suffix.lower() == ".html" else ()
+            render.write(
+                nodes_of(root), args.output, direction=args.direction, depth=args.depth, cards=cards
+            )
         else:
             encoding = results().encoding or "ascii"
-            write(render.text(root, encoding=encoding, depth=args.depth))
+            write(render.text(nodes_of(root), encoding=encoding, depth=args.depth))
     except render.RenderError as error:
         raise BadInput(str(error)) from error
     return Exit.SUCCESS

@@ -33,12 +33,11 @@ class Wanted:
 
 def wanted(root: Behaviour, namespace: str = "") -> Wanted:
     """Return what `root` wants when it runs on a node in `namespace` ("" or with a slash)."""
-    from bt_actions import render
+    from bt_actions.behaviours.places import in_order
 
     namespaces: dict[str, None] = {}
     others: dict[str, str] = {}
-    for row in render.rows(root):
-        node = row.node
+    for node in in_order(root):
         for sort in ("action", "service"):
             name, kind = getattr(node, f"{sort}_name", None), getattr(node, f"{sort}_type", None)
             if not isinstance(name, str) or kind is None:

@@ -1,7 +1,8 @@
 // Everything about the node that is selected, at the time that is shown. The page of a node is built anew only
 // when its shape changes (another node, another attempt, another outcome); what ticks is set in place.
 
-import { el, svg, status_glyph, kind_glyph } from "./glyphs.js";
+import { el, svg } from "./dom.js";
+import { status_glyph, kind_glyph } from "./glyphs.js";
 import { clock, secs, plain, written, short, fields_of, STATE, story, kind_word, place, end_words } from "./words.js";
 import { upper } from "./state.js";
 import { phase_at, because, waiting_for } from "./doing.js";

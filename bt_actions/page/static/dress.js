@@ -1,11 +1,14 @@
 // Theme, sizes of panes, and the words that are shown for a moment.
 
-import { el, icon } from "./glyphs.js";
+import { el } from "./dom.js";
+import { icon } from "./glyphs.js";
+import { TABLE } from "./looks.js";
 
 const find = (id) => document.getElementById(id), page = document.documentElement;
 const kept = (name, value) => { try { if (value === undefined) return localStorage.getItem(name); localStorage.setItem(name, value); } catch { /* a page that may not keep things works all the same */ } return null; };
 
 export function dress() {
+  for (const [name, { fill }] of Object.entries(TABLE.looks)) page.style.setProperty(`--k-${name}`, fill);
   const system = matchMedia("(prefers-color-scheme: dark)"), button = find("theme");
   const look = (dark) => { page.dataset.theme = dark ? "dark" : "light"; button.replaceChildren(icon(dark ? "sun" : "moon")); button.setAttribute("aria-label", dark ? "Light theme" : "Dark theme"); };
   look(kept("bt-actions-theme") ? kept("bt-actions-theme") === "dark" : system.matches);

@@ -1,28 +1,9 @@
-// The shapes: what kind a node is (today's shapes and colours of `bt-actions render`), and how it stands.
-// A status never rests on colour alone: each has an outline of its own, and its word beside it.
+// The shapes: what kind a node is, and how it stands. A status never rests on colour alone: each has an outline of its
+// own, and its word beside it.
 
-const NS = "http://www.w3.org/2000/svg";
-export const el = (name, attributes = {}, ...kids) => {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) {
-    if (value === undefined || value === null || value === false) continue;
-    if (key === "text") made.textContent = value;
-    else if (key === "style") made.style.cssText = value;    // which the page's policy allows, unlike the attribute
-    else if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
-    else made.setAttribute(key, value === true ? "" : value);
-  }
-  made.append(...kids.flat().filter((kid) => kid !== null && kid !== undefined && kid !== false));
-  return made;
-};
-export const svg = (name, attributes = {}, ...kids) => {
-  const made = document.createElementNS(NS, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  made.append(...kids);
-  return made;
-};
+import { svg } from "./dom.js";
+import { look } from "./looks.js";
 
-export const FILL = (node) => (node.server ? "action" : node.shape === "octagon" ? "fallback" : node.shape === "box" ? "sequence"
-  : node.shape === "parallelogram" ? "parallel" : node.children.length ? "decorator" : "leaf");
 const KIND = {
   octagon: "M4.5 1.5h9l3 3v5l-3 3h-9l-3-3v-5z", box: "M1.5 1.5h15v11h-15z",
   parallelogram: "M5.5 1.5h11l-4 11h-11z", ellipse: "M9 1.5c4.6 0 7.5 2.4 7.5 5.500s-2.900 5.500-7.500 5.500-7.500-2.400-7.500-5.500 2.900-5.500 7.500-5.500z",
@@ -32,9 +13,8 @@ const INSIDE = {
   parallelogram: "M6 5.500h6M6 8.500h6",
 };
 export function kind_glyph(node) {
-  const made = svg("svg", { viewBox: "0 0 18 14", class: `kind k-${FILL(node)}`, "aria-hidden": "true" }, svg("path", { d: KIND[node.shape] }));
-  if (INSIDE[node.shape]) made.append(svg("path", { d: INSIDE[node.shape], class: "in" }));
-  return made;
+  const { shape, fill } = look(node);
+  return svg("svg", { viewBox: "0 0 18 14", class: "kind", "aria-hidden": "true" }, svg("path", { d: KIND[shape], fill }), ...(INSIDE[shape] ? [svg("path", { d: INSIDE[shape], class: "in" })] : []));
 }
 
 const line = (d) => ["path", { d, class: "line" }], cut = (d) => ["path", { d, class: "cut" }];

@@ -1,6 +1,7 @@
 // The top of the page: which run, how it stands, and the connection.
 
-import { el, status_glyph } from "./glyphs.js";
+import { el } from "./dom.js";
+import { status_glyph } from "./glyphs.js";
 import { clock, STATE } from "./words.js";
 
 const find = (id) => document.getElementById(id);

@@ -1,6 +1,6 @@
 // Buttons and keys: what each does is said in main.js and transport.js.
 
-import { el } from "./glyphs.js";
+import { el } from "./dom.js";
 
 const find = (id) => document.getElementById(id), TABS = ["details", "values", "log"];
 const KEYS = [["Play, pause", "Space"], ["Event before, next", ", ."], ["Failure before, next", "⇧N N"], ["Go live, or to the end", "L"], ["To what runs now", "G"], ["To the first failure", "F"], ["Follow what runs", "⇧F"], ["Find a node", "/"], ["Outline or drawing", "T"], ["Details", "D"], ["Variables", "V"], ["Log", "O"], ["Move in the tree", "↑ ↓ ← →"], ["Fold, unfold", "Enter"], ["Squeeze gaps", "Z"], ["This help", "?"]];

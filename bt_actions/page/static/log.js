@@ -1,6 +1,7 @@
 // The log: what `log:` nodes say, what becomes of each goal, and what happened to the run itself.
 
-import { el, status_glyph } from "./glyphs.js";
+import { el } from "./dom.js";
+import { status_glyph } from "./glyphs.js";
 import { clock } from "./words.js";
 import { upper } from "./state.js";
 

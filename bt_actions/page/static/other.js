@@ -1,6 +1,6 @@
 // The page where there is no run to show.
 
-import { el } from "./glyphs.js";
+import { el } from "./dom.js";
 
 export function show_none(box, words) {
   const line = (text) => el("div", { class: "cmd" }, el("code", { text }));

@@ -81,8 +81,7 @@ export class Run {
       if (this.of_id.has(id)) continue;
       const up = parent === null ? undefined : this.nodes[this.of_id.get(parent)], [, file, line, col] = /^(.*?)(?::(\d+))?(?::(\d+))?$/.exec(place);
       const node = { ...rest, id: this.nodes.length, number: id, parent: up ? up.id : -1, depth: up ? up.depth + 1 : 0, children: [], ever: [], gone: false,
-        file, line: +line || 0, col: +col || 0, type: action, timeouts: settings.timeouts || null, retry: { attempts: settings.attempts || 1 }, expect: settings.expect, constants: settings.constants || {}, settings,
-        shape: rest.kind.startsWith("sequence") ? "box" : rest.kind.startsWith("fallback") ? "octagon" : rest.kind.startsWith("parallel") ? "parallelogram" : "ellipse" };
+        file, line: +line || 0, col: +col || 0, type: action, timeouts: settings.timeouts || null, retry: { attempts: settings.attempts || 1 }, expect: settings.expect, constants: settings.constants || {}, settings };
       node.words = `${node.name}\n${node.kind}\n${node.server}\n${node.type}\n${place}`.toLowerCase();
       this.of_id.set(id, node.id);
       this.nodes.push(node);

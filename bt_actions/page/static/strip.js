@@ -1,6 +1,7 @@
 // The strip below the header: what runs and what it waits for, or why the run failed.
 
-import { el, status_glyph, kind_glyph } from "./glyphs.js";
+import { el } from "./dom.js";
+import { status_glyph, kind_glyph } from "./glyphs.js";
 import { clock, secs, plain, STATE, place } from "./words.js";
 import { phase_at, branch_of, waiting_for, cause_of, because } from "./doing.js";
 

@@ -1,7 +1,8 @@
 // The timeline: a lane for each action server, a bar for each attempt, its phases as patterns; and the cursor.
 // Time runs through `scale`, which squeezes gaps. The right end of the picture grows in steps, never by the frame.
 
-import { el, status_glyph } from "./glyphs.js";
+import { el } from "./dom.js";
+import { status_glyph } from "./glyphs.js";
 import { clock, secs, PHASE_WORD } from "./words.js";
 
 const NICE = [0.5, 1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 1800], STEP = 15;

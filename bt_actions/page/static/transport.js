@@ -1,6 +1,7 @@
 // Where in time the page stands, and what moves it: events, failures, play, live.
 
-import { el, icon } from "./glyphs.js";
+import { el } from "./dom.js";
+import { icon } from "./glyphs.js";
 import { clock } from "./words.js";
 import { upper } from "./state.js";
 

@@ -1,7 +1,8 @@
 // The tree as an outline. Only the rows in sight exist; they are kept and painted again, never made anew,
 // so that focus, hover and a screen reader's place survive whatever happens in the run.
 
-import { el, svg, status_glyph, kind_glyph } from "./glyphs.js";
+import { el, svg } from "./dom.js";
+import { status_glyph, kind_glyph } from "./glyphs.js";
 import { secs, plain, STATE, kind_word } from "./words.js";
 import { is_old } from "./doing.js";
 

@@ -1,6 +1,6 @@
 // Variables: value, age, writer, and the last values that each had.
 
-import { el, svg } from "./glyphs.js";
+import { el, svg } from "./dom.js";
 import { clock, short, written } from "./words.js";
 import { upper } from "./state.js";
 

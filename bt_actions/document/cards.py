@@ -15,7 +15,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from py_trees.behaviour import Behaviour
 
 from bt_actions.behaviours.kinds import action_of
+from bt_actions.behaviours.places import in_order
 from bt_actions.behaviours.variables import Var
+from bt_actions.document.written import document_of, node_of, own_text
 from bt_actions.goals.policy import Retry, Timeouts
 from bt_actions.messages import fields as ros_fields
 from bt_actions.messages.interfaces import PARTS, Kind, interface, interface_name, short_name
@@ -47,7 +49,33 @@ class Table(NamedTuple):
     lines: tuple[Line, ...]
 
 
-def tables(node: Behaviour, written: TreeNode | None, document: Document | None) -> Iterator[Table]:
+class Card(NamedTuple):
+    """What is told of a node beside its events.Node."""
+
+    tables: tuple[Table, ...]
+    yaml: str
+    """The lines that made it, without its children; "" for a node made in Python."""
+
+
+def cards_of(root: Behaviour) -> list[Card]:
+    """Return the card of each node of a tree, parents first. Nodes of one type share its tables."""
+    types: dict[object, tuple[Table, ...]] = {}
+    found = []
+    for node in in_order(root):
+        written = node_of(node)
+        said = tuple(_tables(node, written, document_of(node)))
+        used = _interface_of(node, written)
+        if used is not None:
+            if used not in types:
+                types[used] = tuple(_described(*used))
+            said += types[used]
+        found.append(Card(said, "" if written is None else own_text(written)))
+    return found
+
+
+def _tables(
+    node: Behaviour, written: TreeNode | None, document: Document | None
+) -> Iterator[Table]:
     """Return what `node` takes and gives, and what it does when things go wrong.
 
     `written` is the node of the document, where there is one; `document` is the tree whose root
@@ -69,8 +97,8 @@ def tables(node: Behaviour, written: TreeNode | None, document: Document | None)
         yield Table("Retry", tuple(_retry(retry)))
 
 
-def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str, Kind] | None:
-    """Return the interface that a node uses, for `describe`; None where it uses none."""
+def _interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str, Kind] | None:
+    """Return the interface that a node uses, for `_described`; None where it uses none."""
     kind: Kind
     for attribute, kind in (("action_type", "action"), ("service_type", "srv")):
         found = getattr(node, attribute, None)
@@ -83,7 +111,7 @@ def interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str,
     return None
 
 
-def describe(given: type | str, kind: Kind) -> Iterator[Table]:
+def _described(given: type | str, kind: Kind) -> Iterator[Table]:
     """Return the fields and constants of an interface's messages, or why there are none to tell."""
     try:
         found = interface(given, kind)
