@@ -191,6 +191,8 @@ node's own, the action's under `actions`, the tree's `defaults`, those that it i
 NAMESPACE = """\
 Names of actions, services and topics are relative where they begin without a slash. Before one go
 the namespaces of the node, of the trees and subtrees around it, and its own."""
+SHOWN = {"if": "recovering"}
+"""The examples that stand below the last of their kinds."""
 TITLES = {
     Group.COMPOSITE: "Composites",
     Group.DECORATOR: "Decorators",
@@ -240,6 +242,7 @@ def section(kind: Kind) -> list[str]:
     return [
         f"### `{kind.name}`", "", kind.doc, "", f"`{kind.name}:` is {value}.", "",
         "```yaml", kind.example, "```", "", *(table(kind.keys.values()) if kind.keys else []),
+        *([*kind.semantics.strip().split("\n"), ""] if kind.semantics else []),
     ]  # fmt: skip
 
 
@@ -305,6 +308,7 @@ def yaml_page() -> str:
         for kind in KINDS.values():
             if kind.group is group:
                 lines += section(kind)
+                lines += [example(SHOWN[kind.name]), ""] if kind.name in SHOWN else []
     return "\n".join(lines).rstrip("\n") + "\n"
 
 

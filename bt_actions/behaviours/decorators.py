@@ -11,20 +11,14 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from py_trees.decorators import Decorator
 
-from bt_actions.behaviours.action import ActionBehaviour
-from bt_actions.behaviours.connected import Timed
-from bt_actions.events.kinds import RoundBegan
-from bt_actions.events.snapshot import HIDDEN, snapshot
-from bt_actions.events.teller import current_teller
+from bt_actions.behaviours.asking import Asking, Number, Rounds, Tries, actions_below, still_ends
 from bt_actions.goals.policy import Retry
 from bt_actions.utilities.plain_data import plain
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.units import parse_duration
 
-Number = Callable[[], object] | None
 
-
-class Gate(Timed, Decorator):
+class Gate(Asking, Decorator):
     """Like py_trees' Decorator, with a question asked first.
 
     A subclass says in `gate` what to do: None ticks the child, RUNNING waits without ticking it,
@@ -32,11 +26,6 @@ class Gate(Timed, Decorator):
     where nothing else is said. Where one of them or `initialise` raises ValueError, the visit fails
     with its text.
     """
-
-    reads_secret = False
-    """Whether it has read a secret in this visit, so that no event tells what it says."""
-    refused = False
-    """Whether it failed by itself: its child did not, or was not ticked this time."""
 
     def gate(self) -> Status | None:
         """Decide what to do this time; called after `initialise`."""
@@ -64,21 +53,8 @@ class Gate(Timed, Decorator):
 
     def _ask(self) -> Status | None:
         if self.status is not Status.RUNNING:
-            self.feedback_message, self.reads_secret = "", False
-            self._seconds = 0.0  # where it is given none
-            self.initialise()
+            self._begin_visit()
         return self.gate()
-
-    def _answer(self, question: Callable[[], Status | None]) -> Status | None:
-        try:
-            return question()
-        except ValueError as error:
-            self.feedback_message, self.refused = str(error), True
-            return Status.FAILURE
-        finally:
-            if (teller := current_teller.get()) is not None and teller.has_news:
-                self.reads_secret |= teller.reads_secret
-                teller.claim(self)
 
 
 class Deadline(Gate):
@@ -110,12 +86,10 @@ class Deadline(Gate):
             self.decorated.stop(Status.INVALID)
         if not self._expired:
             return None
-        below = [node for node in self.decorated.iterate() if isinstance(node, ActionBehaviour)]
-        for node in below:
-            if node.draining:
-                over = f"{self._seconds:g} s are over"
-                self.feedback_message = f"{over}; waiting for {node.name} to end"
-                return Status.RUNNING
+        if waits_for := still_ends(self.decorated):
+            self.feedback_message = f"{self._seconds:g} s are over; {waits_for}"
+            return Status.RUNNING
+        below = actions_below(self.decorated)
         unknown = ", ".join(node.name for node in below if not node.drained)
         told = f"; the end of {unknown} is not known" if unknown else ""
         raise ValueError(f"not done within {self._seconds:g} s{told}")
@@ -188,7 +162,7 @@ class Subtree(Gate):
         return status
 
 
-class Repeat(Gate):
+class Repeat(Rounds, Gate):
     """Ticks its child again when it has succeeded; fails as soon as it fails.
 
     Args:
@@ -198,61 +172,25 @@ class Repeat(Gate):
     """
 
     passes_on = True
-    _again, _counts, _least = Status.SUCCESS, "times", 0
-    _pauses = Retry()
 
     def __init__(self, name: str, child: Behaviour, times: Number) -> None:
         super().__init__(name, child)
         self._times = times
-
-    def initialise(self) -> None:
-        self._done, self._of, self._told = 0, "", -1
-        self._limit: int | None = None
-        if self._times is None:
-            return
-        try:
-            limit = self._times()
-        except ValueError as error:
-            raise ValueError(f"{self._counts}: {error}") from error
-        if isinstance(limit, bool) or not isinstance(limit, int) or limit < self._least:
-            wanted = f"a whole number of at least {self._least} is needed"
-            raise ValueError(f"{self._counts}: {wanted}, not {shorten(limit, 60)}")
-        self._limit, self._of = limit, f" of {limit}"
 
     def gate(self) -> Status | None:
         if self._limit == 0:
             return Status.SUCCESS
         if self.left() > 0.0:
             return Status.RUNNING
-        if self._told != self._done:
-            self._told = self._done
-            if (teller := current_teller.get()) is not None and teller.is_heard:
-                self.reads_secret |= teller.reads_secret
-                hides = self.reads_secret
-                item = HIDDEN if hides and self.item is not None else snapshot(self.item)
-                teller.tell(RoundBegan, self, self._done, None if hides else self._limit, item)
-        return None
-
-    @property
-    def item(self) -> object:
-        """What the present round is about; None where rounds have but a number."""
+        self.tell_round()
         return None
 
     def update(self) -> Status:
         status = self.decorated.status
         return self.count() if status is self._again else status
 
-    def count(self) -> Status:
-        """Count a round that is done, and return the status that follows."""
-        self._done += 1
-        self.feedback_message = f"{self._done}{self._of} done"
-        if self._done == self._limit:
-            return self._again
-        self.give(self._pauses.pause(self._done))
-        return Status.RUNNING
 
-
-class RetryChild(Repeat):
+class RetryChild(Tries, Repeat):
     """Ticks its child again when it has failed, after a pause.
 
     Args:
@@ -264,21 +202,15 @@ class RetryChild(Repeat):
 
     passes_on = True
     in_words = "retry"
-    _again, _counts, _least = Status.FAILURE, "attempts", 1
 
     def __init__(self, name: str, child: Behaviour, attempts: Number, retry: Retry) -> None:
         super().__init__(name, child, attempts)
         self._pauses = retry
 
     def update(self) -> Status:
-        if self.decorated.status is Status.SUCCESS and self._done:
-            self.feedback_message = f"attempt {self._done + 1}{self._of} succeeded"
+        if self.decorated.status is Status.SUCCESS:
+            self.tell_success()
         return super().update()
-
-    def count(self) -> Status:
-        status = super().count()
-        self.feedback_message = f"attempt {self._done}{self._of} failed"
-        return status
 
 
 class ForEach(Repeat):

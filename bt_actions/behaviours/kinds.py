@@ -8,6 +8,7 @@ from py_trees import behaviours, composites, decorators
 from py_trees.behaviour import Behaviour
 from py_trees.composites import Parallel, Selector, Sequence
 
+from bt_actions.behaviours.composites import If
 from bt_actions.behaviours.parallel import Parallel as OwnParallel
 
 _WORDS = {
@@ -39,7 +40,7 @@ def kind(node: Behaviour) -> str:
             name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", base.__name__).lower()
             word = vars(base).get("in_words", name)
             break
-    if isinstance(node, Selector | Sequence) and not node.memory:
+    if isinstance(node, Selector | Sequence | If) and not node.memory:
         return f"reactive {word}"
     if isinstance(node, OwnParallel):
         some = "one" if node.at_least == 1 else f"at least {node.at_least}"

@@ -238,6 +238,15 @@ def test_defaults_merge_key_by_key(around: Surroundings) -> None:
     assert [leaf.retry.attempts for leaf in leaves] == [3, 1]
 
 
+def test_a_tree_recovers_before_its_last_attempt(around: Surroundings) -> None:
+    root = example("recovering")
+    assert around.run(root) is Status.SUCCESS
+    assert around.pose() == pytest.approx(2.0, abs=0.02)
+    behind = load_tree(ROOT / "examples" / "recovering.yaml", {"to": -1.0})
+    assert around.run(behind) is Status.FAILURE
+    assert around.pose() == pytest.approx(0.0, abs=0.02)
+
+
 def test_namespaces_tell_two_robots_apart(around: Surroundings) -> None:
     assert around.run(example("namespaces")) is Status.SUCCESS
     assert around.pose("cell/left") == pytest.approx(1.0, abs=0.02)

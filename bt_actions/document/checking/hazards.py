@@ -14,6 +14,7 @@ from bt_actions.document.checking.reads import find_early_reads, find_missing
 from bt_actions.document.checking.verdicts import Verdicts
 from bt_actions.document.findings import Related
 from bt_actions.document.language.kinds import Can, End, Group
+from bt_actions.document.language.values import Computed
 from bt_actions.document.reading.tree import (
     Declared,
     Document,
@@ -120,7 +121,7 @@ class Hazards:
                 return
 
     def _reactive(self, node: TreeNode, onward: End) -> None:
-        slow = (self._takes_time(child) for child in node.children)
+        slow = (self.takes_time(child) for child in node.children)
         last = max((at for at, takes in enumerate(slow) if takes), default=0)
         begun_anew = [
             self._restarted(child) or child
@@ -152,7 +153,7 @@ class Hazards:
         self._anew[id(root)] = found
         return found
 
-    def _takes_time(self, node: TreeNode) -> bool:
+    def takes_time(self, node: TreeNode) -> bool:
         """Whether a node, or one below it, may take more than one tick."""
         found = self._slow.get(id(node))
         if found is None:
@@ -160,9 +161,17 @@ class Hazards:
             within = [*node.children, below] if below is not None else node.children
             slow = node.kind.begun or node.kind.slow
             busy = slow in node.values if isinstance(slow, str) else slow
-            found = busy or any(self._takes_time(each) for each in within)
+            found = busy or any(self.takes_time(each) for each in within)
             self._slow[id(node)] = found
         return found
+
+    # BT323
+
+    def constant(self, condition: Computed) -> None:
+        """Report a condition that reads nothing."""
+        if not condition.expression.variables:
+            text = f"{condition.expression.text.strip()} never changes"
+            self._report("BT323", span_of(condition.node), text)
 
     # BT312
 

@@ -27,7 +27,8 @@ _KINDS = _table(
         "here it is 'fallback'": "selector asyncfallback fallbackstar selectorwithmemory try",
         "here it is 'fallback' with 'memory: false'": "reactivefallback reactiveselector",
         "here it is 'parallel'": "parallelall parallelnode concurrent all join gather",
-        "here it is 'while'": "whiledoelse eternalguard",
+        "here it is 'while'": "eternalguard",
+        "here it is 'if'": "ifthenelse whiledoelse",
         "here it is 'invert'": "inverter not negate",
         "here it is 'retry'": "retryuntilsuccessful retryuntilsuccesful failureisrunning",
         "here it is 'repeat'": "keeprunninguntilfailure successisrunning",
@@ -50,13 +51,10 @@ _KINDS = _table(
         "here it is 'log'": "print echo say debug",
         "here it is 'service'": "callservice servicecall serviceclient call",
         "here it is 'action'": "sendgoal actionclient",
-        "write a 'fallback' of 'sequence's, each with its 'check' first": "switch case match",
-        "write a 'fallback' of two 'sequence's: one has the 'check' first, the other its opposite":
-        "if ifthenelse",
+        "write an 'if', and another one as its else": "switch case match",
         "write a 'repeat' of a 'sequence' that has a 'wait' last": "every ratecontroller rate "
         "throttle periodic",
-        "write a 'retry' of a 'fallback': the work, then a 'force_failure' of what recovers":
-        "recover recovery recoverynode",
+        "here it is 'retry', with a recover beside its child": "recover recovery recoverynode",
         "write a 'fallback' of 'sequence's, each with a 'check' of whose turn it is and a 'set' of "
         "the next": "roundrobin",
         "write a 'parallel' in which a 'repeat' does the earlier part again": "pipeline "

@@ -199,4 +199,11 @@ HAZARDS = (
         tree("root:\n  publish: note\n  type: std_msgs/msg/String\n  message: {data: “map”}\n"),
         tree('root:\n  publish: note\n  type: std_msgs/msg/String\n  message: {data: "map"}\n'),
     ),
+    _warning("BT323", "a condition that never changes",
+        "The condition reads no variable, so that it is always true, or always false. What it "
+        "never chooses can be left away.",
+        tree("root:\n  if: true\n  then: {success: Go}\n  else: {success: Stay}\n"),
+        tree("inputs: {ready: bool}\nroot:\n  if: $ready\n  then: {success: Go}\n"
+             "  else: {success: Stay}\n"),
+    ),
 )  # fmt: skip

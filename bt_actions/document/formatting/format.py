@@ -17,7 +17,7 @@ from collections.abc import Mapping as MappingType
 
 from bt_actions.document.findings import DocumentError, Span
 from bt_actions.document.kinds import KINDS
-from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES, TOP_KEYS
+from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES, TOP_KEYS, ConditionOrNode
 from bt_actions.document.language.scalars import Shape
 from bt_actions.document.language.shapes import Key, ListOf, OneOf, Record, Table
 from bt_actions.document.yaml.compose import compose, compose_written
@@ -376,7 +376,7 @@ def _shapes_of(node: Mapping, shape: Shape | None) -> MappingType[str, Shape | N
     Keys that it does not know stay where they are, behind the others.
     """
     names = [key.text for key, _ in node.pairs]
-    if shape is NODE:
+    if shape is NODE or isinstance(shape, ConditionOrNode):
         return _node_shapes(names)
     if isinstance(shape, OneOf):
         shape = shape.record
@@ -392,12 +392,14 @@ def _node_shapes(names: list[str]) -> MappingType[str, Shape | None]:
     kinds = [name for name in names if name in KINDS]
     if "child" not in names:  # settings of an action, then
         kinds = [name for name in kinds if name not in ACTION_KEYS]
+    held = {name for kind in kinds for name in KINDS[kind].holds if name != kind}
+    kinds = [name for name in kinds if name not in held]
     foreign = [name for name in names if name not in ACTION_KEYS]
     if len(kinds) == 1:
         kind = KINDS[kinds[0]]
         rest = _forms(kind.keys)
         ordered: dict[str, Shape | None] = {kind.name: kind.value, "name": rest.pop("name", None)}
-        last = {name: rest.pop(name) for name in ("child", "children") if name in rest}
+        last = {name: rest.pop(name) for name in kind.holds if name in rest}
         return ordered | rest | last
     if len(foreign) == 1:
         return {foreign[0]: None, **_forms(ACTION_KEYS)}

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
     from bt_actions.behaviours import (
         action,
+        composites,
         decorators,
         leaves,
         parallel,
@@ -40,15 +41,16 @@ else:
 
     py_trees = _Later("py_trees")
     build, parts = (_Later(f"bt_actions.document.building.{name}") for name in ("build", "parts"))
-    action, decorators, leaves, parallel, reading, run_tree, service, topics = (
+    action, composites, decorators, leaves, parallel, reading, run_tree, service, topics = (
         _Later(f"bt_actions.behaviours.{name}")
         for name in (
-            "action", "decorators", "leaves", "parallel",
+            "action", "composites", "decorators", "leaves", "parallel",
             "reading", "run_tree", "service", "topics",
         )
     )  # fmt: skip
 
 __all__ = [
-    "Behaviour", "Checker", "Context", "Hazards", "TreeNode", "action", "build", "decorators",
-    "leaves", "parallel", "parts", "py_trees", "reading", "run_tree", "service", "topics",
+    "Behaviour", "Checker", "Context", "Hazards", "TreeNode", "action", "build", "composites",
+    "decorators", "leaves", "parallel", "parts", "py_trees", "reading", "run_tree", "service",
+    "topics",
 ]  # fmt: skip

@@ -168,6 +168,18 @@ class _Nodes:
 _NODE: Schema = {"$ref": "#/$defs/node"}
 NODE: Shape = _Nodes("a node", _NODE)
 NODES: Shape = _Nodes("a list of nodes", {"type": "array", "minItems": 1, "items": _NODE})
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionOrNode(Condition):
+    """A condition that an expression says, or a node: it succeeds, or fails."""
+
+    words: str = "an expression or a node"
+
+    def schema(self) -> Schema:
+        return {"anyOf": [Condition().schema(), _NODE]}
+
+
 TOP_KEYS = keyed(
     Key("tree", Name(), "The tree's name.", required=True, example="fetch"),
     _DESCRIPTION,

@@ -19,7 +19,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES, keyed
+from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES, ConditionOrNode, keyed
 from bt_actions.document.language.scalars import Condition, NodeName, Shape
 from bt_actions.document.language.shapes import Key, required_in
 
@@ -127,6 +127,8 @@ class Kind:
     """Whether the child is stopped after some time."""
     computes: bool = False
     """Whether a missing value is nearly all that a node fails for."""
+    semantics: str = ""
+    """Rows of a table in Markdown, with a head, that say what a node does when."""
     includes: bool = False
     """Whether a node stands for another tree, and saves its outputs however that tree ends."""
 
@@ -139,6 +141,12 @@ class Kind:
     def needs(self) -> tuple[Key, ...]:
         """The keys that must be there."""
         return required_in(self.keys)
+
+    @cached_property
+    def holds(self) -> tuple[str, ...]:
+        """The keys that hold nodes, in the order of the children; one may be its own."""
+        own = (self.name,) if isinstance(self.value, ConditionOrNode) else ()
+        return own + tuple(name for name, key in self.keys.items() if key.shape in (NODE, NODES))
 
     @cached_property
     def is_action(self) -> bool:
@@ -161,7 +169,7 @@ class Kind:
         return self.goes_on if self.group is Group.COMPOSITE else None
 
 
-_NAME = Key("name", NodeName(), "The node's name, where the kind's value does not say enough.")
+NAME = Key("name", NodeName(), "The node's name, where the kind's value does not say enough.")
 _CHILDREN = Key("children", NODES, "The nodes it holds.", required=True,
                 example="[{success: First}, {success: Second}]")  # fmt: skip
 _CHILD = Key("child", NODE, "The node it holds.", required=True, example="{success: Done}")
@@ -169,7 +177,12 @@ _CHILD = Key("child", NODE, "The node it holds.", required=True, example="{succe
 KINDS: dict[str, Kind] = {}
 """Every kind of node, by its key; filled by `document/kinds/`, and never changed meanwhile."""
 NODE_KEYS = {*ACTION_KEYS, "child", "children"}
-"""All that may stand in a node beside its kind."""
+"""All that may stand in a node beside its kind, and so names no action.
+
+Other keys that hold nodes may: beside a kind that has such a key, the word is that key.
+"""
+SINCE = dict.fromkeys(("if",), "0.2")
+"""The version of bt_actions since which a word may name no action, where not from the beginning."""
 
 
 def register(*kinds: Kind) -> None:
@@ -178,7 +191,7 @@ def register(*kinds: Kind) -> None:
         if kind.name in KINDS:
             raise ValueError(f"there is a kind {kind.name!r} already")
         KINDS[kind.name] = kind
-        NODE_KEYS.update(kind.keys)
+        NODE_KEYS.update(kind.keys.keys() - set(kind.holds))
 
 
 # `more` is any of the other fields of Kind; a wrong one raises when the kind's file is imported.
@@ -194,13 +207,13 @@ def decorator(
     name: str, doc: str, example: str, *keys: Key, value: Shape | None = None, **more: Any
 ) -> Kind:
     """A kind that holds one node. The first of its keys says how often, or how long."""
-    own = keyed(_CHILD, *keys, *(() if value is None else (_NAME,)))
+    own = keyed(_CHILD, *keys, *(() if value is None else (NAME,)))
     reads, form = keys[0].name if keys else name, value or NodeName()
     return Kind(name, Group.DECORATOR, form, doc, own, example, reads=reads, **more)
 
 
 def leaf(name: str, value: Shape, doc: str, example: str, *keys: Key, **more: Any) -> Kind:
     """A kind that holds nothing; it reads what it sends, or what stands behind its key."""
-    own = keyed(*keys, *(() if isinstance(value, NodeName) else (_NAME,)))
+    own = keyed(*keys, *(() if isinstance(value, NodeName) else (NAME,)))
     more.setdefault("reads", more["interface"].fields if "interface" in more else name)
     return Kind(name, Group.LEAF, value, doc, own, example, **more)

@@ -141,6 +141,15 @@ class _Reader:
                 said = inner
         if said is not None and self._typed(written, said):
             return None
+        alone = _BESIDE_CHILD if written.get("child") is None else ()
+        held = {
+            name
+            for key in kinds
+            if key.text in KINDS and key.text not in alone
+            for name in KINDS[key.text].holds
+            if name != key.text
+        }
+        kinds = [key for key in kinds if key.text not in held]  # though an action is called so
         found = [key for key in kinds if key.text not in _BESIDE_CHILD]
         beside = [key for key in kinds if key.text in _BESIDE_CHILD]
         if not found and written.get("child") is not None:
@@ -210,9 +219,12 @@ class _Reader:
         kind, interface = node.kind, node.kind.interface
         unknown = False
         beside: list[tuple[Scalar, Node]] = []
+        held: dict[str, Node] = {}
         for key, inner in chain(node.node.pairs, beside):
             name = key.text
-            if key is node.key:
+            if name in kind.holds and (key is not node.key or isinstance(inner, Mapping)):
+                written[name] = held[name] = inner
+            elif key is node.key:
                 written[name] = inner
                 if isinstance(inner, Scalar):
                     value = kind.value.read(inner, source)
@@ -225,9 +237,6 @@ class _Reader:
                     node.name = value
                 if value is BAD:
                     source.unread.nodes.append(inner)
-            elif name in _CHILDREN and name in keys:
-                written[name] = inner
-                self._children(node, name, inner)
             else:
                 known = keys.get(name)
                 if known is None:
@@ -249,6 +258,9 @@ class _Reader:
                 if value is BAD:
                     source.unread.nodes.append(inner)
                     source.unread.names |= isinstance(known.shape, Name)
+        for name in reversed(kind.holds):  # the next to be read is the last
+            if name in held:
+                self._children(node, name, held[name])
         if isinstance(own := values.get("name"), str):
             node.name = own
         if unknown:
@@ -331,9 +343,9 @@ class _Reader:
             report_unknown_key(key, keys, self._source, hint)
 
     def _children(self, node: TreeNode, name: str, inner: Node) -> None:
-        if name == "child":
+        if name != "children":
             if isinstance(inner, Listing):
-                message = "'child' is one node, not a list"
+                message = f"{name!r} is one node, not a list"
                 self._source.report("BT109", span_of(inner), message, hint=_IN_SEQUENCE)
                 self._source.unread.nodes.append(inner)
                 written: list[Node] = inner.items

@@ -11,7 +11,7 @@ from collections.abc import Mapping as MappingType
 from bt_actions.document.findings import Span
 from bt_actions.document.findings.elsewhere import key_here
 from bt_actions.document.language.keys import DEFAULTS, LIBRARY_KEYS, TOP_KEYS
-from bt_actions.document.language.kinds import KINDS, NODE_KEYS
+from bt_actions.document.language.kinds import KINDS, NODE_KEYS, SINCE
 from bt_actions.document.language.scalars import words_for
 from bt_actions.document.language.shapes import Key, read_keys
 from bt_actions.document.language.values import BAD
@@ -100,7 +100,10 @@ def _declare(document: Document, table: str, into: dict[str, Declared]) -> None:
         into[key.text] = Declared(key.text, own, key, node, document.source)
         if table == "actions" and _of_node(key.text):
             what = "a kind of node" if key.text in KINDS else "a key of nodes"
-            document.source.report(
-                "BT208", span_of(key), f"{key.text!r} is {what} and cannot name an action"
-            )
+            hint = None
+            if since := SINCE.get(key.text):
+                what = f"{what} since bt_actions {since}"
+                hint = f"rename it here and where it is used, such as '{key.text}_action'"
+            text = f"{key.text!r} is {what} and cannot name an action"
+            document.source.report("BT208", span_of(key), text, hint=hint)
             del into[key.text]

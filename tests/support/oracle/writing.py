@@ -258,6 +258,51 @@ def _try_catch(writer: Writer, element: Element, names: Names) -> Node:
     return _sequence(writer, [_sequence(writer, work), last], "fallback")
 
 
+def _recovery(writer: Writer, element: Element, names: Names) -> Node:
+    child, recover = writer.children(element, names)
+    attempts = int(element.get("number_of_retries", 1)) + 1
+    if attempts == 1:
+        return child
+    return {
+        "retry": writer.name(element.tag),
+        "attempts": attempts,
+        "child": child,
+        "recover": recover,
+    }
+
+
+def _if_then_else(writer: Writer, element: Element, names: Names) -> Node:
+    asked, *branches = writer.children(element, names)
+    node: Node = {"if": asked, "name": writer.name(element.tag)}
+    if element.tag == "WhileDoElse":
+        if element[0].tag in ("Act", "Sleep"):
+            raise NotYet("WhileDoElse of what takes time")
+        node["memory"] = False
+    return {**node, **dict(zip(("then", "else"), branches, strict=False))}
+
+
+def _switch(writer: Writer, element: Element, names: Names) -> Node:
+    *cases, node = writer.children(element, names)
+    variable = names.of_text(element.attrib["variable"])
+    for number, then in reversed(list(enumerate(cases, 1))):
+        asked = f"str(${variable}) == '{element.attrib[f'case_{number}']}'"
+        name = writer.name(element.tag)
+        node = {"if": asked, "name": name, "memory": False, "then": then, "else": node}
+    return node
+
+
+def _precondition(writer: Writer, element: Element, names: Names) -> Node:
+    asked, otherwise = expression(element.attrib["if"], names), element.get("else", "FAILURE")
+    child = writer.node(element[0], names)
+    if otherwise == "SKIPPED":
+        raise NotYet("else=SKIPPED")
+    if otherwise == "RUNNING":
+        waits = {"wait_until": asked, "name": writer.name("wait")}
+        return _sequence(writer, [waits, child])
+    last: Node = {otherwise.lower(): writer.name("else")}
+    return {"if": asked, "name": writer.name(element.tag), "then": child, "else": last}
+
+
 KINDS: Mapping[str, Write] = {
     "Act": _act,
     "Cond": _cond,
@@ -275,6 +320,11 @@ KINDS: Mapping[str, Write] = {
     "ReactiveFallback": _composite("fallback", memory=False),
     "Parallel": _parallel,
     "TryCatch": _try_catch,
+    "RecoveryNode": _recovery,
+    "IfThenElse": _if_then_else,
+    "WhileDoElse": _if_then_else,
+    **dict.fromkeys([f"Switch{number}" for number in range(2, 7)], _switch),
+    "Precondition": _precondition,
     "Inverter": _decorator("invert"),
     "ForceSuccess": _decorator("force_success"),
     "ForceFailure": _decorator("force_failure"),

@@ -2,8 +2,17 @@
 
 from typing import Any
 
-from bt_actions.document.checking.verdicts import of_tries
-from bt_actions.document.kinds.given import Behaviour, Context, Hazards, TreeNode, decorators
+from bt_actions.document.checking.verdicts import of_rounds, of_tries
+from bt_actions.document.kinds.given import (
+    Behaviour,
+    Checker,
+    Context,
+    Hazards,
+    TreeNode,
+    composites,
+    decorators,
+)
+from bt_actions.document.language.keys import NODE
 from bt_actions.document.language.kinds import Can, End, Settings, decorator
 from bt_actions.document.language.scalars import Duration, Quantity, Whole
 from bt_actions.document.language.shapes import Key
@@ -11,11 +20,22 @@ from bt_actions.document.yaml.nodes import span_of
 from bt_actions.goals.policy import Retry
 
 
-def _build(node: TreeNode, context: Context, child: Behaviour) -> Behaviour:
+def _build(node: TreeNode, context: Context, child: Behaviour, *recover: Behaviour) -> Behaviour:
     values: dict[str, Any] = node.values
     given = {key: values[key] for key in ("backoff", "factor", "max_backoff") if key in values}
     attempts = context.value(values["attempts"]) if "attempts" in values else None
+    if recover:
+        return composites.Recover(node.name, child, recover[0], attempts, Retry(**given))
     return decorators.RetryChild(node.name, child, attempts, Retry(**given))
+
+
+def _check(checker: Checker, node: TreeNode) -> None:
+    if "recover" in node.written and node.values.get("attempts") == 1:
+        checker.source.report(
+            "BT110", span_of(node.written["attempts"]),
+            "nothing recovers from the last attempt, and there is but one",
+            hint="attempts: 2 and more, the first among them",
+        )  # fmt: skip
 
 
 def _warn(hazards: Hazards, node: TreeNode, bounded: bool) -> None:
@@ -27,12 +47,32 @@ def _warn(hazards: Hazards, node: TreeNode, bounded: bool) -> None:
 def _ends(values: Settings, inner: list[Can], at_once: bool) -> Can:
     succeed, fail = inner[0]
     limit = values.get("attempts")
+    known = isinstance(limit, int)
+    if len(inner) > 1:  # tries follow each other in one tick, where there is a limit
+        recovers, gives_up = inner[1]
+        over = gives_up or (recovers and limit is not None)
+        return Can(succeed, (fail and over) or not (known or limit is None))
     if at_once:  # each try after the first is a tick later
         return Can(succeed, fail and limit in (0, 1))
-    known = isinstance(limit, int)
     return Can(succeed, limit is not None and (fail or not known))
 
 
+def _seconds(values: Settings, inner: list[float]) -> float:
+    attempts = values.get("attempts")
+    between = of_rounds(sum(inner[1:]), attempts - 1) if isinstance(attempts, int) else 0.0
+    return of_tries(inner[0], values) + between
+
+
+_SEMANTICS = """
+With `recover`:
+
+| | `child` | `recover` |
+|---|---|---|
+| SUCCESS | SUCCESS | the next attempt, in the same tick where there is no pause, and a limit |
+| FAILURE | of the last attempt: FAILURE; else `recover`, in the same tick | FAILURE |
+| RUNNING | RUNNING | RUNNING |
+| stopped | attempts begin at 1 | attempts begin at 1 |
+"""
 KIND = decorator(
     "retry",
     "Ticks its child again when it has failed.",
@@ -41,6 +81,7 @@ KIND = decorator(
     Key("backoff", Duration(zero=True), "The pause before the second try.", default="0 s"),
     Key("factor", Quantity(1.0), "Each pause is this much longer.", default="2"),
     Key("max_backoff", Duration(zero=True), "The longest pause.", default="60 s"),
-    build=_build, warn=_warn, ends=_ends, slow=True, again=End.FAILURE,
-    seconds=lambda values, inner: of_tries(inner[0], values),
+    Key("recover", NODE, "What to do after each failure but the last, before the pause."),
+    build=_build, check=_check, warn=_warn, ends=_ends, seconds=_seconds, slow=True,
+    again=End.FAILURE, semantics=_SEMANTICS,
 )  # fmt: skip

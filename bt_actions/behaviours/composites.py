@@ -1,0 +1,275 @@
+"""Composites that py_trees has not: a retry that recovers, a choice, a pipeline, turns.
+
+They are py_trees' composites, and work in anybody's tree. `work` says which child is ticked next:
+it yields what these ticks yield, and returns the status that follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+from py_trees.composites import Composite
+
+from bt_actions.behaviours.asking import Asking, Number, Tries, still_ends
+from bt_actions.behaviours.leaving import is_left_out, leave_out
+from bt_actions.goals.policy import Retry
+
+Work = Generator[Behaviour, None, Status]
+"""Ticks of children, and what follows from them."""
+
+
+class Working(Asking, Composite):
+    """Stops what still runs below when it ends; children have no status when a visit begins."""
+
+    left_out = False
+
+    def due_in(self) -> float | None:
+        """Return None: a composite has no time of its own, unless it says so."""
+        return None
+
+    def work(self) -> Work:
+        """Tick children, and return the status that follows; called after `initialise`."""
+        raise NotImplementedError
+
+    def tick(self) -> Iterator[Behaviour]:
+        self.refused, status = False, None
+        if self.status is not Status.RUNNING:
+            self.left_out, self.current_child = False, None
+            self._stop_children()
+            self.status = Status.RUNNING  # should a child raise, `stop` is to reach the others
+            status = self._answer(self._begin_visit)
+        if status is None:
+            status = yield from self.work()
+        if status is not Status.RUNNING:
+            for child in self.children:
+                if child.status is Status.RUNNING:
+                    child.stop(Status.INVALID)
+            self.stop(status)
+        self.status = status
+        yield self
+
+    def ticked(self, child: Behaviour) -> Work:
+        """Tick a child, and return its status."""
+        self.current_child = child
+        yield from child.tick()
+        return child.status
+
+    def _stop_children(self) -> None:
+        for child in self.children:
+            if child.status is not Status.INVALID:
+                child.stop(Status.INVALID)
+
+
+class Recover(Tries, Working):
+    """Tries its child, and does something about each failure but the last, before the next attempt.
+
+    The attempts follow each other in the same tick where nothing takes time, unless their number
+    has no limit. What fails to recover has failed for good.
+
+    Args:
+        name: as in py_trees.
+        child: what to try.
+        recover: what to do after a failure, when another attempt is to come.
+        attempts: all tries, or a function that gives their number; None is without limit.
+        retry: the pauses, between `recover` and the next attempt, on the node's clock.
+    """
+
+    passes_on = True
+    in_words = "retry"
+
+    def __init__(
+        self,
+        name: str,
+        child: Behaviour,
+        recover: Behaviour,
+        attempts: Number = None,
+        retry: Retry | None = None,
+    ) -> None:
+        super().__init__(name, [child, recover])
+        self._times = attempts
+        self._pauses = retry or Retry()
+
+    def initialise(self) -> None:
+        super().initialise()
+        self._recovers = False
+
+    def due_in(self) -> float | None:
+        """Return the seconds until the next attempt; None while something runs."""
+        return None if any(each.status is Status.RUNNING for each in self.children) else self.left()
+
+    def work(self) -> Work:
+        child, recover = self.children
+        while True:
+            if self._recovers:
+                status = yield from self.ticked(recover)
+                if is_left_out(recover) and status is not Status.RUNNING:
+                    status = Status.FAILURE
+                if status is not Status.SUCCESS:
+                    return status
+                self._recovers = False
+                self.give(self._pauses.pause(self._done))
+                if self._limit is None:
+                    return Status.RUNNING
+            if self.left() > 0.0:
+                return Status.RUNNING
+            self.tell_round()
+            status = yield from self.ticked(child)
+            if status is not Status.RUNNING and is_left_out(child):
+                return leave_out(self)
+            if status is Status.SUCCESS:
+                self.tell_success()
+            if status is not Status.FAILURE or self.count() is Status.FAILURE:
+                return status
+            self._recovers = True
+
+
+class If(Working):
+    """Ticks one of two children, as a condition says.
+
+    Args:
+        name: as in py_trees.
+        condition: asked in each visit until it has an answer; a child that succeeds (yes) or fails
+            (no), or a function that may raise ValueError, which fails the node.
+        then: what to do where it holds.
+        otherwise: what to do where it does not; None fails.
+        memory: whether the choice is kept to the end of the visit. Else the condition is asked
+            before each tick, and what is not chosen any more is stopped; the other begins when the
+            goals of what was stopped have ended.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        condition: Behaviour | Callable[[], bool],
+        then: Behaviour,
+        otherwise: Behaviour | None = None,
+        *,
+        memory: bool = True,
+    ) -> None:
+        asked = [condition] if isinstance(condition, Behaviour) else []
+        branches = [each for each in (then, otherwise) if each is not None]
+        super().__init__(name, [*asked, *branches])
+        self._condition, self._then, self._otherwise = condition, then, otherwise
+        self.memory = memory
+
+    def initialise(self) -> None:
+        self._chosen: Behaviour | None = None
+        self._has_chosen = False
+        self._ends: Behaviour | None = None
+        """The branch that was stopped, and whose goals may still run."""
+
+    def work(self) -> Work:
+        if not (self._has_chosen and self.memory):
+            status = yield from self._ask()
+            if isinstance(self._condition, Behaviour) and is_left_out(self._condition):
+                return leave_out(self)
+            if status is Status.RUNNING or self.refused:
+                return status
+            self._choose(self._then if status is Status.SUCCESS else self._otherwise)
+        if self._ends is not None:
+            self.feedback_message = still_ends(self._ends)
+            if self.feedback_message:
+                return Status.RUNNING
+            self._ends = None
+        if self._chosen is None:
+            self.refused, self.feedback_message = True, "the condition does not hold"
+            return Status.FAILURE
+        status = yield from self.ticked(self._chosen)
+        if status is not Status.RUNNING and is_left_out(self._chosen):
+            return leave_out(self)
+        return status
+
+    def _ask(self) -> Work:
+        asked = self._condition
+        if isinstance(asked, Behaviour):
+            return (yield from self.ticked(asked))
+
+        def answer() -> Status:
+            return Status.SUCCESS if asked() else Status.FAILURE
+
+        return self._answer(answer) or Status.INVALID
+
+    def _choose(self, chosen: Behaviour | None) -> None:
+        before = self._chosen
+        if before is not None and before is not chosen and before.status is Status.RUNNING:
+            before.stop(Status.INVALID)
+            self._ends = before
+        self._chosen, self._has_chosen = chosen, True
+
+
+class Pipeline(Working):
+    """Ticks its children in order, and those again that have succeeded, while a later one runs.
+
+    It ticks up to the first child that is RUNNING at or behind the farthest place that it has
+    reached; children before that may run, too. It fails with any of them, and succeeds with the
+    last. A child that has succeeded begins again at each tick; `Every` holds it back.
+
+    Args:
+        name: as in py_trees.
+        children: in order.
+    """
+
+    passes_on = True
+
+    def __init__(self, name: str, children: Sequence[Behaviour]) -> None:
+        super().__init__(name, children)
+
+    def initialise(self) -> None:
+        self._reached = 0
+
+    def work(self) -> Work:
+        left_out = 0
+        for place, child in enumerate(self.children):
+            status = yield from self.ticked(child)
+            if status is Status.RUNNING:
+                if place >= self._reached:
+                    self._reached = place
+                    return status
+            elif is_left_out(child):
+                left_out += 1
+            elif status is Status.FAILURE:
+                return status
+        return leave_out(self) if left_out == len(self.children) else Status.SUCCESS
+
+
+class InTurn(Working):
+    """A fallback that begins behind the child that has succeeded last.
+
+    A visit tries each child once, from there to the last and on from the first. It begins at the
+    first child after all have failed, and after it was stopped while it ran.
+
+    Args:
+        name: as in py_trees.
+        children: in order.
+    """
+
+    passes_on = True
+    in_words = "fallback in turn"
+
+    def __init__(self, name: str, children: Sequence[Behaviour]) -> None:
+        super().__init__(name, children)
+        self._next = 0
+
+    def initialise(self) -> None:
+        self._tried = self._left_out = 0
+
+    def work(self) -> Work:
+        while self._tried < len(self.children):
+            child = self.children[self._next]
+            status = yield from self.ticked(child)
+            if status is Status.RUNNING:
+                return status
+            self._next = (self._next + 1) % len(self.children)
+            self._tried += 1
+            if is_left_out(child):
+                self._left_out += 1
+            elif status is Status.SUCCESS:
+                return status
+        self._next = 0
+        return leave_out(self) if self._left_out == self._tried else Status.FAILURE
+
+    def terminate(self, new_status: Status) -> None:
+        if new_status is Status.INVALID and self.status is Status.RUNNING:
+            self._next = 0
