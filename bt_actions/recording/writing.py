@@ -190,8 +190,9 @@ class RunWriter:
         if self._values:
             at = self._log_time(event.at)
             for path, text in event.sources.items():
+                name = f"trees/{path}".encode(errors="backslashreplace").decode()
                 data = text.encode("utf-8", "replace")
-                self._record(Attachment(at, at, f"trees/{path}", "application/yaml", data))
+                self._record(Attachment(at, at, name, "application/yaml", data))
             plain = to_plain(replace(event, sources={}))
             for name in ("inputs", "versions"):
                 data = as_json(plain[name]).encode()

@@ -113,8 +113,9 @@ def test_a_folder_for_logs_that_cannot_be_is_named_with_the_remedy(domain: int) 
 def test_a_name_of_a_file_that_is_no_utf_8_is_one_like_others(tmp_path: Path, domain: int) -> None:
     odd = os.fsdecode(bytes(tmp_path / "says") + b"\xff")
     Path(f"{odd}.yaml").write_text("tree: says\nroot: {log: hello}\n")
-    done = bare("run", f"{odd}.yaml", "--sim", "--json")
-    assert done.returncode == 0, done.stderr
+    done = bare("run", f"{odd}.yaml", "--sim", "--json", "--record", f"{odd}.mcap")
+    assert (done.returncode, done.stderr.count("\n")) == (0, 1), done.stderr
+    assert '"hello"' in bare("replay", f"{odd}.mcap", "--json").stdout
     assert json.loads(done.stdout.splitlines()[1])["place"] == f"{odd}.yaml:2:8"
     for form in ("svg", "html", "txt"):
         assert bare("render", f"{odd}.yaml", "-o", f"{odd}.{form}").returncode == 0
