@@ -19,7 +19,7 @@ from pathlib import Path
 
 from bt_actions.document import DocumentError, Finding, Tree, open_tree
 from bt_actions.document.reading.find import is_tree_file
-from bt_actions.serving.requests import Refused, Said, inputs_of
+from bt_actions.serving.requests import GoalRefused, Mistake, inputs_of
 from bt_actions.utilities.patience import Patience
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import did_you_mean
@@ -39,7 +39,7 @@ _NOT_READ = (
 _Stamp = tuple[int, int, int] | None
 
 
-class State(enum.Enum):
+class FileState(enum.Enum):
     """How the file of a tree stands."""
 
     OK = 0
@@ -48,7 +48,7 @@ class State(enum.Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class ServedTree:
     """A tree as it can be run at this moment."""
 
     name: str
@@ -56,18 +56,18 @@ class Entry:
     tree: Tree | None
     """The latest version that checks; None where there was none."""
     digest: str
-    findings: tuple[Said, ...]
+    findings: tuple[Mistake, ...]
     """The mistakes in the file as it is now."""
     stamps: Mapping[Path, _Stamp]
     hides: tuple[Path, ...] = ()
     """Files of the same name that are not served."""
 
     @property
-    def state(self) -> State:
+    def state(self) -> FileState:
         """Whether its file checks, and if not, whether an older version is kept."""
         if not self.findings:
-            return State.OK
-        return State.INVALID if self.tree is None else State.KEPT_LAST_GOOD
+            return FileState.OK
+        return FileState.INVALID if self.tree is None else FileState.KEPT_LAST_GOOD
 
 
 class Catalog:
@@ -95,13 +95,13 @@ class Catalog:
                     raise NotADirectoryError(f"{folder} is no folder of trees")
         self._python = frozenset(python)
         self._lock = threading.Lock()
-        self._entries: dict[str, Entry] = {}
+        self._entries: dict[str, ServedTree] = {}
         self._listed: dict[Path, list[Path]] = {}
         """The files of each folder, as of the last look."""
         self._there: list[Path] = []
         """The folders that answer."""
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[ServedTree]:
         """Return all trees, by name."""
         with self._lock, self._patience:
             found = [self._entry(name, paths) for name, paths in sorted(self._files().items())]
@@ -109,33 +109,33 @@ class Catalog:
             self._patience.seconds = PATIENCE
             return list(self._entries.values())
 
-    def find(self, name: str) -> Entry:
-        """Return the tree of this name, as it is now. Raises Refused."""
+    def find(self, name: str) -> ServedTree:
+        """Return the tree of this name, as it is now. Raises GoalRefused."""
         with self._lock, self._patience:
             files = self._files()
             entry = self._entry(name, files.get(name, ()))
             if entry is None:
                 shown = name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}..."
                 near = did_you_mean(name, files) or "; ListTrees tells which there are"
-                raise Refused("UNKNOWN_TREE", f"there is no tree {shown!r} here{near}")
+                raise GoalRefused("UNKNOWN_TREE", f"there is no tree {shown!r} here{near}")
             self._entries[name] = entry
             return entry
 
-    def check(self, name: str, inputs: str) -> tuple[Entry, Tree, Mapping[str, object]]:
+    def check(self, name: str, inputs: str) -> tuple[ServedTree, Tree, Mapping[str, object]]:
         """Return the tree that a goal would run, as it is now, and the values of its inputs.
 
-        Raises Refused, which says what is wrong.
+        Raises GoalRefused, which says what is wrong.
         """
         entry = self.find(name)
         if entry.tree is None:
             first, more = entry.findings[0], len(entry.findings) - 1
             rest = f" (and {more} more)" if more else ""
-            raise Refused(first.code, f"{first.message}{rest}", first.place)
+            raise GoalRefused(first.code, f"{first.message}{rest}", first.place)
         values = inputs_of(inputs)
         try:
             entry.tree.check_inputs(values)
         except ValueError as error:
-            raise Refused("INPUTS", str(error), "inputs") from None
+            raise GoalRefused("INPUTS", str(error), "inputs") from None
         return entry, entry.tree, values
 
     def _files(self) -> dict[str, list[Path]]:
@@ -159,7 +159,7 @@ class Catalog:
             return self._patience((file, other), partial(file.samefile, other))
         return False
 
-    def _entry(self, name: str, files: Sequence[Path]) -> Entry | None:
+    def _entry(self, name: str, files: Sequence[Path]) -> ServedTree | None:
         """Return the entry of the first of some files that holds a tree, as it is now."""
         before = self._entries.get(name)
         for number, file in enumerate(files):
@@ -170,8 +170,8 @@ class Catalog:
                     raise TimeoutError  # as its folder
                 entry = self._patience(file, partial(self._read, name, file, known, there))
             except TimeoutError:
-                said = Said("BT100", _NOT_READ, str(file))
-                known = known or Entry(name, file, None, "", (), {})
+                said = Mistake("BT100", _NOT_READ, str(file))
+                known = known or ServedTree(name, file, None, "", (), {})
                 entry = replace(known, findings=(said,))
             if entry is not None:
                 hides = tuple(files[number + 1 :])
@@ -179,8 +179,8 @@ class Catalog:
         return None
 
     def _read(
-        self, name: str, file: Path, before: Entry | None, there: tuple[Path, ...]
-    ) -> Entry | None:
+        self, name: str, file: Path, before: ServedTree | None, there: tuple[Path, ...]
+    ) -> ServedTree | None:
         """Return the entry of a file, or None for one that holds no tree.
 
         May hang, so it changes nothing; `there` are the folders that answer.
@@ -195,11 +195,11 @@ class Catalog:
                 return None
             said = tuple(_said(each) for each in error.findings)
             if before is None:
-                return Entry(name, file, None, "", said, {})
+                return ServedTree(name, file, None, "", said, {})
             return replace(before, findings=said)
         files = tree.files
         stamps = {path: _stamp(path, before=begun - RACY) for path in files}
-        return Entry(name, file, tree, _digest(files), (), stamps)
+        return ServedTree(name, file, tree, _digest(files), (), stamps)
 
 
 def _trees_in(folder: Path) -> list[Path]:
@@ -214,9 +214,9 @@ def _holds_no_tree(findings: Iterable[Finding]) -> bool:
     return any(each.code == "BT106" and "for trees to import" in each.message for each in findings)
 
 
-def _said(finding: Finding) -> Said:
+def _said(finding: Finding) -> Mistake:
     hint = f" ({finding.hint})" if finding.hint else ""
-    return Said(finding.code, f"{finding.message}{hint}", str(finding.place))
+    return Mistake(finding.code, f"{finding.message}{hint}", str(finding.place))
 
 
 def _stamp(path: Path, *, before: int | None = None) -> _Stamp:

@@ -12,7 +12,7 @@ from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import listing
 
 if TYPE_CHECKING:
-    from bt_actions.serving.goal import Goal
+    from bt_actions.serving.goal import ServedGoal
 
 COMMANDS = {
     "pause": ControlTree.Request.PAUSE,
@@ -32,12 +32,12 @@ class Control:
 
     def __init__(
         self,
-        goals: Callable[[], dict[bytes, Goal]],
-        halt: Callable[[Goal], None],
-        say: Callable[[Goal, str], None],
+        goals: Callable[[], dict[bytes, ServedGoal]],
+        halt: Callable[[ServedGoal], None],
+        say: Callable[[ServedGoal, str], None],
     ) -> None:
         self._goals, self._say = goals, say
-        self._does: dict[str, Callable[[Goal], None]] = {
+        self._does: dict[str, Callable[[ServedGoal], None]] = {
             "pause": lambda goal: goal.run.pause(True),
             "resume": lambda goal: goal.run.pause(False),
             "halt": halt,

@@ -11,9 +11,9 @@ from typing import NamedTuple
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from bt_actions.ros.serving.endpoints import Endpoints
-from bt_actions.serving.catalog import State
+from bt_actions.serving.catalog import FileState
 from bt_actions.serving.outcome import RunOutcome
-from bt_actions.story.state import State as RunState
+from bt_actions.story.state import State
 from bt_actions.story.why import waits
 
 PERIOD = 1.0
@@ -21,11 +21,11 @@ PERIOD = 1.0
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
-class Standing(NamedTuple):
+class TreeStanding(NamedTuple):
     """A tree, and what runs of it and has run."""
 
     tree: str
-    state: State = State.OK
+    state: FileState = FileState.OK
     running: int = 0
     paused: int = 0
     """Of those that run."""
@@ -35,7 +35,7 @@ class Standing(NamedTuple):
     last: RunOutcome | None = None
     """How its last run ended."""
 
-    def beside(self, run: RunState, *, paused: bool) -> Standing:
+    def beside(self, run: State, *, paused: bool) -> TreeStanding:
         """Return it with one more run."""
         return self._replace(
             running=self.running + 1,
@@ -45,12 +45,12 @@ class Standing(NamedTuple):
         )
 
 
-def judge(standing: Standing, refuses: str) -> tuple[bytes, str]:
+def judge(standing: TreeStanding, refuses: str) -> tuple[bytes, str]:
     """Return the level of a tree, and why; `refuses` says why its server accepts nothing."""
     last, running = standing.last, standing.running
     if refuses:
         return ERROR, f"not serving: {refuses}"
-    if standing.state is State.INVALID:
+    if standing.state is FileState.INVALID:
         return ERROR, "its file does not check"
     if last is not None and not last.settled:
         return ERROR, f"the last run is not settled: {last.unaccounted[0]} may still be running"
@@ -60,7 +60,7 @@ def judge(standing: Standing, refuses: str) -> tuple[bytes, str]:
         return WARN, "paused"
     if standing.retrying:
         return WARN, "an action is tried again"
-    if standing.state is State.KEPT_LAST_GOOD:
+    if standing.state is FileState.KEPT_LAST_GOOD:
         return WARN, "its file does not check; the last good version is used"
     return OK, "running" if running else "ready"
 
@@ -75,7 +75,7 @@ class Diagnostics:
     def __init__(
         self,
         endpoints: Endpoints,
-        look: Callable[[], tuple[Iterable[Standing], str]],
+        look: Callable[[], tuple[Iterable[TreeStanding], str]],
         submit: Callable[[Callable[[], None]], object],
         yields: Callable[[], bool],
     ) -> None:
@@ -97,7 +97,7 @@ class Diagnostics:
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
 
-    def _status(self, who: str, standing: Standing, refuses: str) -> DiagnosticStatus:
+    def _status(self, who: str, standing: TreeStanding, refuses: str) -> DiagnosticStatus:
         level, message = judge(standing, refuses)
         values = {
             "state": standing.state.name,

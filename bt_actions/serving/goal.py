@@ -13,7 +13,7 @@ FASTEST, SLOWEST = 0.1, 1.0
 
 
 @dataclass(slots=True, eq=False)
-class Goal:
+class ServedGoal:
     """A goal that runs, or waits for its turn."""
 
     client: Any

@@ -10,9 +10,9 @@ from builtin_interfaces.msg import Duration
 from unique_identifier_msgs.msg import UUID
 
 from bt_actions.goals.policy import End
-from bt_actions.serving.catalog import Entry
+from bt_actions.serving.catalog import ServedTree
 from bt_actions.serving.outcome import ENDS, OUTCOMES, SEPARATOR, RunOutcome
-from bt_actions.serving.requests import Said
+from bt_actions.serving.requests import Mistake
 from bt_actions.serving.run import Run
 from bt_actions.serving.story import warnings_of
 from bt_actions.story.actions import ActionStory
@@ -54,12 +54,12 @@ def _leaf(state: State, story: NodeStory) -> RunningLeaf:
     return RunningLeaf(path=path, message=message, attempt=action.attempt, attempts=action.of)
 
 
-def finding(said: Said) -> Finding:
+def finding(said: Mistake) -> Finding:
     """Return one thing that is wrong."""
     return Finding(**said._asdict())
 
 
-def info(entry: Entry, goals: Iterable[tuple[UUID, Run, bool]]) -> TreeInfo:
+def info(entry: ServedTree, goals: Iterable[tuple[UUID, Run, bool]]) -> TreeInfo:
     """Return a tree, and of each of its goals the run, and whether that has begun."""
     tree, goals = entry.tree, list(goals)
     return TreeInfo(

@@ -7,7 +7,7 @@ from bt_actions_interfaces.msg import Rejection
 
 from bt_actions.ros.rosout import Tell
 from bt_actions.ros.serving.endpoints import Endpoints, kept
-from bt_actions.serving.requests import Refused
+from bt_actions.serving.requests import GoalRefused
 from bt_actions.utilities.plain_text import clean
 
 REJECTIONS = 10
@@ -23,7 +23,7 @@ class Rejections:
         self._node = endpoints.node
         self._publisher = endpoints.publisher(Rejection, "~/rejections", kept(REJECTIONS))
 
-    def tell(self, goal: RunTree.Goal, refused: Refused) -> None:
+    def tell(self, goal: RunTree.Goal, refused: GoalRefused) -> None:
         """Say why a goal is rejected."""
         said = refused.finding
         place = f" ({said.place})" if said.place else ""

@@ -21,17 +21,17 @@ _LONGEST = 1000
 """Characters of a reason: it may quote what it is about."""
 
 
-class Refused(Exception):
+class GoalRefused(Exception):
     """A goal is not accepted. `code` is a rule's (BT104), or a word in capitals."""
 
     def __init__(self, code: str, message: str, place: str = "") -> None:
         said = clean(message)
         said = said if len(said) <= _LONGEST else f"{said[: _LONGEST - 1]}…"
         super().__init__(said)
-        self.finding = Said(code, said, place)
+        self.finding = Mistake(code, said, place)
 
 
-class Said(NamedTuple):
+class Mistake(NamedTuple):
     """One thing that is wrong, as a Finding message has it."""
 
     code: str
@@ -40,11 +40,16 @@ class Said(NamedTuple):
 
 
 def inputs_of(text: str) -> Mapping[str, object]:
-    """Return the mapping that a text holds as YAML or JSON; an empty text is {}. Raises Refused."""
+    """Return the mapping that a text holds as YAML or JSON; an empty text is {}.
+
+    Raises GoalRefused.
+    """
     data = text.encode("utf-8", "surrogatepass")
     if len(data) > MAX_BYTES:
         size = f"{len(data):,} bytes of inputs"
-        raise Refused("INPUTS", f"{size} are more than {MAX_BYTES:,}; put large data into a file")
+        raise GoalRefused(
+            "INPUTS", f"{size} are more than {MAX_BYTES:,}; put large data into a file"
+        )
     if not text.strip():
         return {}
     try:
@@ -53,13 +58,15 @@ def inputs_of(text: str) -> Mapping[str, object]:
         if source.findings:
             raise DocumentError(source.findings)
         if not isinstance(node, YamlMapping):
-            raise Refused("INPUTS", "inputs are a mapping, such as {pick_at: 2.0}", "inputs:1:1")
+            raise GoalRefused(
+                "INPUTS", "inputs are a mapping, such as {pick_at: 2.0}", "inputs:1:1"
+            )
         values = data_of(node)
         refuse_large(values)
     except DocumentError as error:
         first = error.findings[0]
-        raise Refused(first.code, first.message, str(first.place)) from None
+        raise GoalRefused(first.code, first.message, str(first.place)) from None
     except (ValueError, RecursionError) as error:
-        raise Refused("INPUTS", str(error), "inputs:1:1") from None
+        raise GoalRefused("INPUTS", str(error), "inputs:1:1") from None
     assert isinstance(values, dict)
     return values

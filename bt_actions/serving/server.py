@@ -30,12 +30,12 @@ from bt_actions.ros.serving.precedence import Precedence
 from bt_actions.running.runner import TreeRunner
 from bt_actions.serving.catalog import Catalog
 from bt_actions.serving.control import Control
-from bt_actions.serving.diagnostics import Diagnostics, Standing
-from bt_actions.serving.goal import FASTEST, Goal
+from bt_actions.serving.diagnostics import Diagnostics, TreeStanding
+from bt_actions.serving.goal import FASTEST, ServedGoal
 from bt_actions.serving.messages import finding, info, result
 from bt_actions.serving.outcome import Code, Ending, RunOutcome
 from bt_actions.serving.rejections import ECHO, Rejections
-from bt_actions.serving.requests import Refused
+from bt_actions.serving.requests import GoalRefused
 from bt_actions.serving.run import Run
 from bt_actions.serving.story import begins, ends, warnings_of
 from bt_actions.serving.turns import Policy, Turns
@@ -112,8 +112,8 @@ class TreeServer:
         self.stuck: list[str] = []
         """A line for each run that was left, as it did not end after `abandon`."""
         self._abandoned = threading.Event()
-        self._turns: Turns[Goal] = Turns(Policy(policy), most)
-        self._goals: dict[bytes, Goal] = {}
+        self._turns: Turns[ServedGoal] = Turns(Policy(policy), most)
+        self._goals: dict[bytes, ServedGoal] = {}
         self._canceled_early: set[bytes] = set()
         self._refuses = "it is unconfigured"
         self._last: dict[str, RunOutcome] = {}
@@ -230,14 +230,14 @@ class TreeServer:
         self.halt(Ending.DEACTIVATED, "it is finalized")
         self.catalog = Catalog(())
 
-    def _standings(self) -> tuple[list[Standing], str]:
+    def _standings(self) -> tuple[list[TreeStanding], str]:
         entries = self.catalog.entries()
         with self._lock:
             goals = [goal for goal in self._turns.running if goal.begun]
             found = []
             for entry in entries:
                 runs = [goal.run for goal in goals if goal.tree == entry.name]
-                standing = Standing(entry.name, entry.state, last=self._last.get(entry.name))
+                standing = TreeStanding(entry.name, entry.state, last=self._last.get(entry.name))
                 for run in runs:
                     with run.told() as state:
                         standing = standing.beside(state, paused=run.paused)
@@ -253,7 +253,7 @@ class TreeServer:
             with self._lock:  # the other goals that came meanwhile are admitted by now
                 self._refuse_more()
                 self._turns.expected += 1
-        except Refused as refused:
+        except GoalRefused as refused:
             self._rejections.tell(goal, refused)
             return None
         return _Admitted(entry.name, str(entry.file), tree, values)
@@ -262,11 +262,11 @@ class TreeServer:
         with self._lock:
             self._refuse_inactive()
             if refusal := self._turns.refusal():
-                raise Refused("BUSY", refusal)
+                raise GoalRefused("BUSY", refusal)
 
     def _refuse_inactive(self) -> None:
         if why := self._refuses or self.precedence.why:
-            raise Refused("INACTIVE", f"this server accepts no goals: {why}")
+            raise GoalRefused("INACTIVE", f"this server accepts no goals: {why}")
 
     def _on_accepted(self, client: Any, admitted: _Admitted) -> None:
         run = Run(
@@ -280,7 +280,7 @@ class TreeServer:
         )
         called = clean(client.request.goal_name)[:ECHO]
         begin = begins(admitted.file, admitted.tree, admitted.inputs, called)
-        goal = Goal(client, run, admitted.name, begin)
+        goal = ServedGoal(client, run, admitted.name, begin)
         with self._answered:
             self._goals[goal.id] = goal
             begun, halted = self._turns.come(goal)
@@ -327,7 +327,7 @@ class TreeServer:
             self._refuse_inactive()
             await self._off(self.catalog.check, request.tree, request.inputs)
             self._refuse_more()
-        except Refused as refused:
+        except GoalRefused as refused:
             response.findings = [finding(refused.finding)]
         response.accepted = not response.findings
         return response
@@ -338,7 +338,7 @@ class TreeServer:
 
     # Runs
 
-    def _begin(self, goals: Iterable[Goal]) -> None:
+    def _begin(self, goals: Iterable[ServedGoal]) -> None:
         for goal in goals:
             with self._lock:  # the timer's callback stops it where nothing has begun
                 goal.begun_at = time.monotonic()
@@ -352,7 +352,7 @@ class TreeServer:
         if self._recorder is not None:
             self._recorder.record(runner.stream, runner.ticks_since)
 
-    def _end(self, goal: Goal, ending: Ending) -> None:
+    def _end(self, goal: ServedGoal, ending: Ending) -> None:
         """End a goal before its time, also one that waits for its turn."""
         goal.run.end(ending)
         with self._lock:
@@ -364,7 +364,7 @@ class TreeServer:
             outcome = RunOutcome(int(code), f"{words} before it began")
             self._worker.submit(self._ended, goal, outcome)  # not here: this may be a callback
 
-    def _ended(self, goal: Goal, outcome: RunOutcome) -> None:
+    def _ended(self, goal: ServedGoal, outcome: RunOutcome) -> None:
         """Have the goal of a run that is over answered, and the next run begin."""
         seconds = None if goal.begun_at is None else time.monotonic() - goal.begun_at
         self._tell_of(goal, ends(outcome, seconds), "info" if outcome.as_wanted else "error")
@@ -385,10 +385,10 @@ class TreeServer:
             self._answered.notify_all()
         self._begin(begun)
 
-    def _tell_of(self, goal: Goal, text: str, level: Level = "info") -> None:
+    def _tell_of(self, goal: ServedGoal, text: str, level: Level = "info") -> None:
         self._say(level, f"{goal.label} {text}")
 
-    def _answer(self, goal: Goal, outcome: RunOutcome) -> None:
+    def _answer(self, goal: ServedGoal, outcome: RunOutcome) -> None:
         status = GoalStatus.STATUS_ABORTED
         if outcome.code == Code.NONE:
             status = GoalStatus.STATUS_SUCCEEDED

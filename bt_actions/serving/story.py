@@ -8,9 +8,9 @@ from py_trees.common import Status
 
 from bt_actions.document import Tree
 from bt_actions.events.snapshot import HIDDEN
-from bt_actions.serving.catalog import Entry
+from bt_actions.serving.catalog import ServedTree
 from bt_actions.serving.outcome import Code, Ending, RunOutcome
-from bt_actions.serving.requests import Said
+from bt_actions.serving.requests import Mistake
 from bt_actions.story.words import begins_text, verdict
 from bt_actions.utilities.plain_text import clean
 
@@ -41,9 +41,11 @@ def ends(outcome: RunOutcome, seconds: float | None) -> str:
     return f"ends: {verdict(status, seconds)}{left}{before}{why}"
 
 
-def warnings_of(entry: Entry) -> list[Said]:
+def warnings_of(entry: ServedTree) -> list[Mistake]:
     """Return what is wrong with the name of a tree: other files have the same name."""
     return [
-        Said(SAME_NAME, f"{entry.file} is served as {entry.name!r}, and {each} is not", str(each))
+        Mistake(
+            SAME_NAME, f"{entry.file} is served as {entry.name!r}, and {each} is not", str(each)
+        )
         for each in entry.hides
     ]

@@ -44,7 +44,7 @@ ENDS = frozenset({Event.CANCELED, Event.SUCCEEDED, Event.ABORTED, Event.DIED})
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class JournalLine:
     """One line."""
 
     t: float
@@ -130,16 +130,16 @@ class Journal:
             self._file = None
 
 
-def read(path: str | os.PathLike[str]) -> list[Entry]:
+def read(path: str | os.PathLike[str]) -> list[JournalLine]:
     """Return the lines of a journal in the order of their times; a torn last line is left out."""
     text = Path(path).read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
     return sorted((_entry(line) for line in whole.splitlines()), key=lambda entry: entry.t)
 
 
-def _entry(line: str) -> Entry:
+def _entry(line: str) -> JournalLine:
     more = json.loads(line)
-    return Entry(
+    return JournalLine(
         t=more.pop("t"),
         server=more.pop("server"),
         goal=more.pop("goal"),
@@ -164,7 +164,7 @@ class Interval:
 
 
 def live_intervals(
-    entries: Iterable[Entry],
+    entries: Iterable[JournalLine],
     server: str | None = None,
     *,
     killed: Mapping[int, float] | None = None,
@@ -193,7 +193,7 @@ def live_intervals(
 
 
 def max_live(
-    entries: Iterable[Entry],
+    entries: Iterable[JournalLine],
     server: str | None = None,
     *,
     killed: Mapping[int, float] | None = None,
@@ -219,7 +219,7 @@ def max_live(
 
 
 def ends(
-    entries: Iterable[Entry], server: str | None = None
+    entries: Iterable[JournalLine], server: str | None = None
 ) -> dict[tuple[str, str], Event | None]:
     """Return how each goal that was received ended.
 
@@ -239,6 +239,6 @@ def ends(
     return found
 
 
-def executions(entries: Iterable[Entry]) -> dict[tuple[str, str], int]:
+def executions(entries: Iterable[JournalLine]) -> dict[tuple[str, str], int]:
     """Return how often each goal, by server and id, was accepted: twice is executed twice."""
     return Counter((entry.server, entry.goal) for entry in entries if entry.event is Event.ACCEPTED)

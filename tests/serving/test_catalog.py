@@ -16,8 +16,8 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.document import Tree, open_tree
-from bt_actions.serving.catalog import Catalog, State
-from bt_actions.serving.requests import Refused
+from bt_actions.serving.catalog import Catalog, FileState
+from bt_actions.serving.requests import GoalRefused
 from tests.support.waiting import until
 
 TREE = "tree: {name}\ninputs: {{n: {{type: int32, default: 1}}}}\nroot: {{success: Done}}\n"
@@ -47,7 +47,7 @@ def catalog(tmp_path: Path, write: Write) -> Catalog:
 
 
 def refusal(catalog: Catalog, name: str, inputs: str = "") -> tuple[str, str]:
-    with pytest.raises(Refused) as raised:
+    with pytest.raises(GoalRefused) as raised:
         catalog.check(name, inputs)
     return raised.value.finding.code, raised.value.finding.message
 
@@ -58,8 +58,8 @@ def test_a_tree_is_known_by_the_name_of_its_file(catalog: Catalog, write: Write)
     write("words.yaml", "actions: {}\n")  # for others to import
     write("notes.txt", "no tree")
     assert [(each.name, each.state) for each in catalog.entries()] == [
-        ("go", State.OK),
-        ("stop", State.OK),
+        ("go", FileState.OK),
+        ("stop", FileState.OK),
     ]
 
 
@@ -83,7 +83,7 @@ def test_a_tree_that_does_not_check_is_refused_as_check_words_it(
     write("go.yaml", "tree: go\nroot: {sucess: Done}\n")
     code, message = refusal(catalog, "go")
     assert (code, "did you mean 'success'" in message) == ("BT201", True)
-    assert catalog.entries()[0].state is State.INVALID
+    assert catalog.entries()[0].state is FileState.INVALID
 
 
 def test_a_file_that_changed_is_read_again_and_else_it_is_not(
@@ -124,11 +124,11 @@ def test_one_that_no_longer_checks_keeps_its_last_good_version_and_says_so(
     good = catalog.find("go").tree
     write("go.yaml", "tree: [")
     entry = catalog.find("go")
-    assert (entry.state, entry.tree) == (State.KEPT_LAST_GOOD, good)
+    assert (entry.state, entry.tree) == (FileState.KEPT_LAST_GOOD, good)
     assert entry.findings[0].code == "BT102"
     catalog.check("go", "")
     write("go.yaml")
-    assert catalog.find("go").state is State.OK
+    assert catalog.find("go").state is FileState.OK
 
 
 def test_a_tree_that_was_checked_stays_what_it_was(catalog: Catalog, write: Write) -> None:
@@ -327,13 +327,13 @@ def test_a_file_that_cannot_be_read_soon_is_one_broken_tree_until_it_has_been_re
     catalog = Catalog([tmp_path / "trees"])
     for _ in range(2):
         assert {each.name: each.state for each in catalog.entries()} == {
-            "a": State.OK, "go": State.INVALID, "z": State.OK,
+            "a": FileState.OK, "go": FileState.INVALID, "z": FileState.OK,
         }  # fmt: skip
     code, message = refusal(catalog, "go")
     assert (code, "cannot be read" in message) == ("BT100", True)
     assert mount.reads.count("go.yaml") == 1, "it is not begun again meanwhile"
     mount.answers.set()
-    until(lambda: catalog.find("go").state is State.OK)
+    until(lambda: catalog.find("go").state is FileState.OK)
 
 
 def test_where_a_file_cannot_be_read_soon_the_last_good_version_is_kept(
@@ -345,9 +345,9 @@ def test_where_a_file_cannot_be_read_soon_the_last_good_version_is_kept(
     write("go.yaml")
     mount.stuck = {"go.yaml"}
     entry = catalog.find("go")
-    assert (entry.state, entry.tree) == (State.KEPT_LAST_GOOD, good)
+    assert (entry.state, entry.tree) == (FileState.KEPT_LAST_GOOD, good)
     mount.answers.set()
-    until(lambda: catalog.find("go").state is State.OK)
+    until(lambda: catalog.find("go").state is FileState.OK)
 
 
 def test_a_folder_that_does_not_answer_holds_up_no_other(
@@ -368,7 +368,7 @@ def test_a_folder_that_does_not_answer_holds_up_no_other(
 
     monkeypatch.setattr(Path, "resolve", stuck(resolve))
     monkeypatch.setattr(Path, "iterdir", stuck(iterdir))
-    assert catalog.find("go").state is State.OK
+    assert catalog.find("go").state is FileState.OK
 
 
 def test_python_comes_from_named_packages_only(write: Write, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.srv import ControlTree
 
 from bt_actions.serving.catalog import Catalog
-from bt_actions.serving.requests import MAX_BYTES, Refused
+from bt_actions.serving.requests import MAX_BYTES, GoalRefused
 from bt_actions.utilities.plain_text import clean
 from tests.serving.conftest import Serve
 from tests.support.tree_client import TreeClient
@@ -110,7 +110,7 @@ def catalog(tmp_path: Path) -> Catalog:
 
 
 def is_refused_in_a_line(catalog: Catalog, name: str, inputs: str) -> str:
-    with pytest.raises(Refused) as raised:
+    with pytest.raises(GoalRefused) as raised:
         catalog.check(name, inputs)
     said = raised.value.finding
     assert said.message

@@ -8,8 +8,8 @@ from bt_actions_interfaces.msg import ActionReport, TreeInfo
 
 from bt_actions import load_tree
 from bt_actions.goals.policy import End, Outcome
-from bt_actions.serving.catalog import State
-from bt_actions.serving.diagnostics import Standing, judge
+from bt_actions.serving.catalog import FileState
+from bt_actions.serving.diagnostics import TreeStanding, judge
 from bt_actions.serving.outcome import ENDS, OUTCOMES, Code, outcome_of
 from bt_actions.story.why import why
 from bt_actions.testing import Simulation, VirtualNetwork, VirtualRunner
@@ -30,8 +30,8 @@ def test_each_error_code_has_its_number(code: Code) -> None:
     assert code == getattr(RunTree.Result, code.name)
 
 
-@pytest.mark.parametrize("state", State)
-def test_each_state_of_a_tree_has_its_number(state: State) -> None:
+@pytest.mark.parametrize("state", FileState)
+def test_each_state_of_a_tree_has_its_number(state: FileState) -> None:
     assert state.value == getattr(TreeInfo, state.name)
 
 
@@ -48,4 +48,4 @@ def test_a_failure_is_told_as_in_a_terminal_and_its_first_line_is_enough() -> No
     assert "failed before, and dealt with:" in rest
     assert left == "may still be running: Home on /move_robot"
     settled = outcome_of(runner.state, succeeded=False)
-    assert judge(Standing("night", last=settled), "")[1] == f"the last run failed: {cause}"
+    assert judge(TreeStanding("night", last=settled), "")[1] == f"the last run failed: {cause}"

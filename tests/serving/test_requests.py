@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bt_actions.serving.requests import MAX_BYTES, Refused, inputs_of
+from bt_actions.serving.requests import MAX_BYTES, GoalRefused, inputs_of
 
 
 @pytest.mark.parametrize("text", ["", "  \n", "{}"])
@@ -41,7 +41,7 @@ def test_nothing_in_them_is_computed_and_no_file_is_read(text: str) -> None:
     ids=["broken", "list", "text", "twice", "huge", "deep", "nul", "surrogate", "large", "bomb"],
 )  # fmt: skip
 def test_what_is_no_mapping_within_bounds_is_refused(text: str, code: str, message: str) -> None:
-    with pytest.raises(Refused) as raised:
+    with pytest.raises(GoalRefused) as raised:
         inputs_of(text)
     assert message in raised.value.finding.message
     assert raised.value.finding.code == code

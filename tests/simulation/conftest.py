@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from bt_actions.simulation import journal
-from bt_actions.simulation.journal import Entry, Event
+from bt_actions.simulation.journal import Event, JournalLine
 from bt_actions.testing import VirtualNetwork
 from bt_actions.testing.transport import VirtualParticipant
 from bt_actions.traffic.transport import Request
@@ -270,7 +270,7 @@ class Bench(ABC):
     def go_on_for(self, seconds: float) -> None:
         """Let the clients go on for a while, to see that something does not come."""
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[JournalLine]:
         return journal.read(self.path) if self.path.exists() else []
 
     def events(self) -> list[str]:

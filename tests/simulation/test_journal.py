@@ -11,13 +11,13 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bt_actions.simulation import journal
-from bt_actions.simulation.journal import Entry, Event, Journal
+from bt_actions.simulation.journal import Event, Journal, JournalLine
 
 S = "/move_robot"
 
 
-def entry(t: float, goal: str, event: Event, *, server: str = S, pid: int = 1) -> Entry:
-    return Entry(t, server, goal, event, pid)
+def entry(t: float, goal: str, event: Event, *, server: str = S, pid: int = 1) -> JournalLine:
+    return JournalLine(t, server, goal, event, pid)
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def serve(bench: Bench, space: str) -> Any:
     return serve
 
 
-def received(bench: Bench) -> list[j.Entry]:
+def received(bench: Bench) -> list[j.JournalLine]:
     return [entry for entry in bench.entries() if entry.event is j.Event.RECEIVED]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bt_actions import End
 from bt_actions.events import Event, GoalChanged
-from bt_actions.simulation.journal import Entry, ends, executions
+from bt_actions.simulation.journal import JournalLine, ends, executions
 
 
 class Report:
@@ -18,7 +18,7 @@ class Report:
             self.goals[event.goal_id] = event
 
 
-def compare(report: Report, entries: list[Entry]) -> dict[str, str]:
+def compare(report: Report, entries: list[JournalLine]) -> dict[str, str]:
     """Fail unless report and journal agree on every goal; return the ends by goal."""
     journal = {goal: str(end) for (_, goal), end in ends(entries).items()}
     unknown = {goal for goal, event in report.goals.items() if event.end is End.UNKNOWN}

@@ -20,7 +20,7 @@ from types import MappingProxyType
 from typing import IO, Any
 
 from bt_actions.simulation import journal
-from bt_actions.simulation.journal import Entry
+from bt_actions.simulation.journal import JournalLine
 from tests.support.middleware import on_loopback
 from tests.support.waiting import until
 
@@ -149,7 +149,7 @@ class Journal:
     def __repr__(self) -> str:
         return f"<Journal of {self.server}: {', '.join(self.events())}>"
 
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[JournalLine]:
         """Return all lines about this server so far."""
         if not self.path.exists():
             return []
@@ -163,7 +163,7 @@ class Journal:
         """Return how often `event` has happened."""
         return sum(entry.event == event for entry in self.entries())
 
-    def wait_for(self, event: str, times: int = 1, within: float = 5.0) -> Entry:
+    def wait_for(self, event: str, times: int = 1, within: float = 5.0) -> JournalLine:
         """Wait until `event` has happened so often, and return the last of them."""
         until(lambda: self.count(event) >= times, within, what=f"{event} x{times} in the journal")
         return [entry for entry in self.entries() if entry.event == event][times - 1]
