@@ -37,7 +37,8 @@ COMMANDS = {
     "check": "check",
     "interfaces": "interfaces",
     "explain": "explain",
-    "format": "format_trees",
+    "format": "trees.format_trees",
+    "import": "trees.import_trees",
     "schema": "schema",
     "render": "render",
 }

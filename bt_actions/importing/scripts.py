@@ -13,6 +13,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -44,11 +45,11 @@ class ScriptError(ValueError):
 
 
 class Refused(ScriptError):
-    """A script that our language cannot say; `what` is the name of what is refused."""
+    """Something that our language cannot say; `what` is its row in refused.yaml."""
 
-    def __init__(self, what: str) -> None:
-        super().__init__(what)
-        self.what = what
+    def __init__(self, what: str, detail: str = "") -> None:
+        super().__init__(detail or what)
+        self.what, self.detail = what, detail
 
 
 class Sort(Enum):
@@ -89,9 +90,10 @@ class Said(NamedTuple):
         return self.text if self.binds >= least else f"({self.text})"
 
 
-def statements(code: str) -> list[Statement]:
+@lru_cache(maxsize=1024)
+def statements(code: str) -> tuple[Statement, ...]:
     """Read a script. Raises ScriptError."""
-    return _Reader(code).statements()
+    return tuple(_Reader(code).statements())
 
 
 def condition(code: str) -> Part:
@@ -218,6 +220,7 @@ class Sorts:
     used: dict[str, set[Sort]] = field(default_factory=dict)
     """By what is done with them."""
     _later: list[tuple[str, Part]] = field(default_factory=list)
+    _alike: list[tuple[str, str]] = field(default_factory=list)
 
     def __getitem__(self, name: str) -> Sort:
         found = self.told.get(name) or self.used.get(name) or set()
@@ -238,6 +241,8 @@ class Sorts:
         """Take note of a script; `key` gives a name of it the name that it has here."""
         for name, sign, value in code:
             self._use(value, Sort.ANY, key)
+            if name and value.kind == "name":
+                self.alike(key(name), key(value.signs[0]))
             if name and sign in (":=", "=", "+="):
                 self._later.append((key(name), _renamed(value, key)))
             elif name:
@@ -249,10 +254,17 @@ class Sorts:
             for name, value in self._later:
                 if (sort := say(value, self.__getitem__, str, check=False).sort) is not Sort.ANY:
                     self._tell(name, sort)
+            for one, other in (*self._alike, *(pair[::-1] for pair in self._alike)):
+                if self[one] is Sort.ANY and self[other] is not Sort.ANY:
+                    self.use(one, self[other])
 
     def add_condition(self, asked: Part, key: Callable[[str], str] = str) -> None:
         """As `add`, of a condition."""
         self._use(asked, Sort.TRUTH, key)
+
+    def alike(self, one: str, other: str) -> None:
+        """Take note that two variables are of one sort."""
+        self._alike.append((one, other))
 
     def use(self, name: str, sort: Sort) -> None:
         """Take note of what a variable is used as."""
@@ -280,6 +292,8 @@ class Sorts:
             found = {literal[each.kind] for each in part.parts if each.kind in literal}
             found |= {Sort.NUMBER for each in part.parts if each.kind in ("unary", "binary")}
             inner = [next(iter(found)) if len(found) == 1 else Sort.ANY] * len(part.parts)
+            names = [key(each.signs[0]) for each in part.parts if each.kind == "name"]
+            self._alike += pairwise(names)
         for each, sort in zip(part.parts, inner, strict=True):
             self._use(each, sort, key)
 

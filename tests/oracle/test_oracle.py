@@ -1,61 +1,54 @@
-"""Trees of BehaviorTree.CPP, said in our language, do what they did there, tick by tick."""
+"""Trees of BehaviorTree.CPP, imported, do what they did there, tick by tick."""
 
 from __future__ import annotations
 
 import gzip
-from itertools import islice
 from pathlib import Path
 
 import pytest
 
-from tests.support.oracle import writing
+from bt_actions.importing.kinds import KINDS
 from tests.support.oracle.cases import CASES, Case, read
-from tests.support.oracle.comparing import difference, listed, sayable
+from tests.support.oracle.comparing import difference, listed
+from tests.support.oracle.importing import NotYet
 
-SAYABLE = 1703
+SAYABLE = 1837
 """How many of the 4,000 cases the language can say; grows with each construct."""
 
 
-@pytest.fixture(scope="module")
-def cases() -> list[Case]:
-    return list(sayable(read()))
-
-
-def surprises(cases: list[Case], file: Path) -> list[str]:
-    """Where a case differs that is not listed, or one agrees that is."""
-    known, found = listed(), []
+def surprises(cases: list[Case], folder: Path) -> tuple[int, list[str]]:
+    """How many cases were played, and where one differs that is not listed, or agrees that is."""
+    known, found, played = listed(), [], 0
     for case in cases:
-        told = difference(case, file)
+        try:
+            told = difference(case, folder)
+        except NotYet:
+            continue
+        played += 1
         if case.id not in known:
             found += [told] if told else []
         elif not told:
             found.append(f"{case.id} agrees: take it off the list")
-    return found
+    return played, found
 
 
-def test_so_many_cases_can_be_said(cases: list[Case]) -> None:
-    assert len(cases) == SAYABLE
-
-
-def test_the_first_200_cases_agree_or_are_listed(cases: list[Case], tmp_path: Path) -> None:
-    assert surprises(cases[:200], tmp_path / "tree.yaml") == []
+def test_a_tenth_of_the_cases_agree_or_are_listed(tmp_path: Path) -> None:
+    played, found = surprises(list(read())[::10], tmp_path)
+    assert found == []
+    assert played > SAYABLE / 12
 
 
 @pytest.mark.slow
-def test_all_cases_agree_or_are_listed(cases: list[Case], tmp_path: Path) -> None:
-    assert surprises(cases, tmp_path / "tree.yaml") == []
-    assert listed().keys() <= {case.id for case in cases}
+def test_all_cases_agree_or_are_listed(tmp_path: Path) -> None:
+    assert surprises(list(read()), tmp_path) == (SAYABLE, [])
 
 
-def test_a_tree_that_is_said_wrongly_is_found_out(
-    cases: list[Case], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_tree_that_is_imported_wrongly_is_found_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        writing, "KINDS", {**writing.KINDS, "ReactiveSequence": writing.KINDS["Sequence"]}
-    )
-    reactive = [case for case in cases if case.kinds == ("ReactiveSequence",)]
-    found = [difference(case, tmp_path / "tree.yaml") for case in islice(reactive, 20)]
-    assert any(found)
+    monkeypatch.setitem(KINDS, "ReactiveSequence", KINDS["Sequence"])
+    reactive = [case for case in read() if case.kinds == ("ReactiveSequence",)]
+    assert any(difference(case, tmp_path) for case in reactive[:20])
 
 
 def test_the_file_of_cases_says_what_was_asked() -> None:

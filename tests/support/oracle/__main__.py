@@ -15,7 +15,7 @@ from pathlib import Path
 from tests.support.oracle import scripts
 from tests.support.oracle.cases import CASES, read
 from tests.support.oracle.comparing import difference
-from tests.support.oracle.writing import NotYet
+from tests.support.oracle.importing import NotYet
 
 
 def main() -> None:
@@ -30,7 +30,7 @@ def main() -> None:
             mode = "exact" if case.is_exact else "once"
             rows = (f"in all, {mode}", f"{case.group}, {mode}", *case.kinds)
             try:
-                found = difference(case, Path(directory) / "tree.yaml")
+                found = difference(case, Path(directory))
             except NotYet as missing:
                 not_yet[str(missing)] += 1
                 continue

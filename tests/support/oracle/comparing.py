@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from tests.support.oracle.cases import Case
 from tests.support.oracle.world import World
-from tests.support.oracle.writing import NotYet, Writer
 
 DIFFERENCES = Path(__file__).parents[2] / "oracle" / "differences.txt"
 
 
-def sayable(cases: Iterable[Case]) -> Iterator[Case]:
-    """Leave out the cases whose trees the language cannot say yet."""
-    for case in cases:
-        try:
-            Writer(case)
-        except NotYet:
-            continue
-        yield case
+def difference(case: Case, folder: Path) -> str:
+    """Play a case, written into a folder; tell the first tick that differs, or "".
 
-
-def difference(case: Case, file: Path) -> str:
-    """Play a case, whose tree is written into `file`; tell the first tick that differs, or ""."""
-    world = World(case, file)
+    Raises NotYet.
+    """
+    world = World(case, folder)
     played = world.play()
     assert not any(server.live for server in world.servers.values()), f"{case.id}: goals are left"
     for number, (here, there) in enumerate(zip(played, case.expected, strict=True)):

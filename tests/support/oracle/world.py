@@ -19,7 +19,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import yaml
 from py_trees.common import Status
 from py_trees.trees import BehaviourTree
 from robot_control_interfaces.action import MoveRobot
@@ -36,8 +35,10 @@ from bt_actions.testing import VirtualBackend, VirtualNetwork
 from bt_actions.testing.host import VirtualHost
 from bt_actions.utilities.stepping import Done
 from tests.support.oracle.cases import Case, Tick
-from tests.support.oracle.writing import ROUND_A_TICK, Writer, values_of
+from tests.support.oracle.importing import values_of, write
 
+ROUND_A_TICK = "KeepRunningUntilFailure", "LoopInt"
+"""The loops whose next round waits for the next tick of the world; nodes are named by their tag."""
 STATUSES = {"S": STATUS_SUCCEEDED, "F": STATUS_ABORTED, "x": STATUS_CANCELED}
 """What the server of a goal says of its end."""
 
@@ -133,12 +134,11 @@ class Server:
 
 
 class World:
-    """A case, and what is there for its tree, which is written into `file`."""
+    """A case, and what is there for its tree, which is written into `folder`."""
 
-    def __init__(self, case: Case, file: Path) -> None:
+    def __init__(self, case: Case, folder: Path) -> None:
         """Raises NotYet where the language cannot say the tree."""
-        text = yaml.dump(Writer(case).tree, Dumper=yaml.CSafeDumper, sort_keys=False)
-        file.write_text(text, encoding="utf-8")
+        file = write(case, folder)
         self.case = case
         self.now = 0
         """The number of the tick."""

@@ -1,0 +1,108 @@
+"""Files of XML to files of YAML, with a report: `convert` is all that a caller needs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bt_actions.document.formatting.format import format_source
+from bt_actions.document.yaml.source import Source
+from bt_actions.importing.kinds import KINDS
+from bt_actions.importing.mapping import Map, nav2
+from bt_actions.importing.names import identifier
+from bt_actions.importing.project import SUBTREES, Definition, Project, kind_of
+from bt_actions.importing.reading import XmlError
+from bt_actions.importing.report import Report, Verdict
+from bt_actions.importing.text import document
+from bt_actions.importing.writer import STUBS, Writer
+
+_CLASS = """
+
+class {name}(Leaf):
+    def __init__(self, name: str{arguments}) -> None:
+        super().__init__(name)
+"""
+_STUBS = '''"""Leaves of the imported trees that are to be written: nothing was known of them."""
+
+from __future__ import annotations
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+
+class Leaf(Behaviour):
+    def update(self) -> Status:
+        self.feedback_message = f"{type(self).__name__} is to be written"
+        return Status.FAILURE
+'''
+
+
+@dataclass
+class Imported:
+    """What came of an import."""
+
+    files: dict[str, str] = field(default_factory=dict)
+    """The text of each file, by its name."""
+    report: Report = field(default_factory=Report)
+    failed: list[XmlError] = field(default_factory=list)
+    """Files that could not be read."""
+
+
+def convert(paths: list[Path], mapping: Map | None = None) -> Imported:
+    """Write the trees of some files in our language."""
+    imported = Imported()
+    project = Project(paths, nav2() if mapping is None else mapping, imported.report)
+    imported.failed = project.failed
+    names: dict[str, str] = {}
+    for name in project.trees:
+        names[name] = _unique(identifier(name), names.values())
+    called = {
+        element.attributes.get("ID", "")
+        for definition in project.trees.values()
+        for element in definition.element.walk()
+        if kind_of(element) in SUBTREES
+    }
+    waiting = [each for each in project.trees.values() if each.name not in called]
+    waiting = waiting or list(project.trees.values())  # they hold each other
+    begun: list[Definition] = []
+    stubs: dict[str, set[str]] = {}
+
+    def call(definition: Definition) -> str:
+        waiting.append(definition)
+        return names[definition.name]
+
+    while waiting:
+        definition = waiting.pop(0)
+        if definition in begun:
+            continue
+        begun.append(definition)
+        writer = Writer(project, definition, KINDS, call)
+        tree = writer.tree(names[definition.name])
+        text = document(tree, tree.comments)
+        name = f"{names[definition.name]}.yaml"
+        imported.files[name] = format_source(Source(name, text))
+        for stub, arguments in writer.stubs.items():
+            stubs.setdefault(stub, set()).update(arguments)
+    for definition in project.trees.values():
+        for element in definition.element.children:
+            for inner in element.walk():
+                if not imported.report.knows(inner):
+                    why = "its tree is not used by any that was written"
+                    imported.report.node(inner, Verdict.DROPPED, why)
+    if stubs:
+        imported.files[f"{STUBS}.py"] = _STUBS + "".join(map(_class, sorted(stubs.items())))
+    return imported
+
+
+def _class(stub: tuple[str, set[str]]) -> str:
+    name, arguments = stub
+    keys = "".join(f", {each}: object = None" for each in sorted(arguments))
+    return _CLASS.format(name=name, arguments=f", *{keys}" if keys else "")
+
+
+def _unique(word: str, taken: Collection[str]) -> str:
+    name, number = word, 2
+    while name in taken:
+        name, number = f"{word}_{number}", number + 1
+    return name

@@ -1,0 +1,137 @@
+"""Leaves of one's own, by a map; classes that are to be written stand for the others."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from bt_actions.importing.given import Given
+from bt_actions.importing.mapping import SAVES, Leaf
+from bt_actions.importing.names import value_of
+from bt_actions.importing.project import ports_of, variable_in
+from bt_actions.importing.scripts import Refused
+from bt_actions.importing.text import Node
+
+_MISSING = object()
+"""The value of a port that the XML does not give."""
+
+
+def leaf(given: Given) -> Node:
+    writer = given.writer
+    known = writer.project.mapping.leaves.get(given.kind)
+    if known is not None:
+        return _Filled(given, known).node()
+    if given.element.children:
+        raise Refused("decorator")
+    arguments = {}
+    for port, text in ports_of(given.element):
+        if variable_in(text, port) is not None:
+            given.dropped(port, "a python node takes no variable: write a kind of your own")
+        elif re.fullmatch(r"[A-Za-z]\w*", port) and port != "name":
+            arguments[port] = value_of(text, "")
+            given.converted(port)
+    return writer.stub(given, arguments, "nothing is known of it, and --map has no row")
+
+
+class _Filled:
+    """A node of a map, with the values of its ports."""
+
+    def __init__(self, given: Given, leaf: Leaf) -> None:
+        self._given, self._leaf = given, leaf
+        self._texts = dict(ports_of(given.element))
+
+    def node(self) -> Node:
+        given, leaf = self._given, self._leaf
+        kind, value = next(iter(leaf.node.items()))
+        rest = {key: each for key, each in leaf.node.items() if key != kind}
+        if value is None:
+            node = Node({kind: given.name()})
+        else:
+            node = given.named(
+                Node({kind: self._saves(value) if kind in SAVES else self._fill(value)})
+            )
+        self._declare(kind, node)
+        for key, each in rest.items():
+            filled = self._saves(each) if key in SAVES else self._fill(each)
+            if filled is not _MISSING and filled != {}:
+                node[key] = filled
+        for port in self._texts:
+            given.dropped(port, "the map has no place for it")
+        return node
+
+    def _declare(self, kind: str, node: Node) -> None:
+        """Have the tree declare the words that the node uses."""
+        writer, mapping = self._given.writer, self._given.writer.project.mapping
+        for word in {kind, *re.findall(r"\$(\w+)", repr(self._leaf.node))} - set(self._leaf.ports):
+            if word in mapping.imports:
+                writer.imports.add(mapping.imports[word][0])
+            elif (section := mapping.section_of(word)) is not None:
+                writer.words.setdefault(section, {})[word] = mapping.words[section][word]
+        server = self._texts.pop("server_name", None)
+        if server is None or kind not in mapping.imports:
+            return
+        self._given.converted("server_name")
+        node["action"] = node.pop(kind)
+        node["type"], node["server"] = mapping.imports[kind][1], server
+
+    def _port(self, port: str) -> object:
+        """The value of a port, `$name` for a variable, or _MISSING."""
+        declared = self._leaf.ports.get(port, {})
+        attributes = self._given.element.attributes
+        if port not in attributes:
+            is_left_out = declared.get("with", port) not in (port, *attributes)
+            return _MISSING if is_left_out else declared.get("default", _MISSING)
+        self._texts.pop(port, None)
+        self._given.converted(port)
+        text = attributes[port]
+        variable = variable_in(text, port)
+        if variable is None:
+            return value_of(text, str(declared.get("type", "")))
+        if variable in self._given.scope.literals:
+            return self._given.scope.literals[variable]
+        return f"${self._given.scope[variable]}"
+
+    def _saves(self, saves: Mapping[str, str]) -> dict[str, str]:
+        found = {}
+        for port, expression in saves.items():
+            value = self._port(port)
+            if isinstance(value, str) and value.startswith("$"):
+                found[value[1:]] = self._fill(expression)
+        return found
+
+    def _fill(self, value: Any) -> Any:
+        if isinstance(value, Mapping):
+            filled = {key: self._fill(inner) for key, inner in value.items()}
+            left = {key: each for key, each in filled.items() if each is not _MISSING}
+            return left if left or not value else _MISSING
+        if isinstance(value, list):
+            return [each for each in map(self._fill, value) if each is not _MISSING]
+        if not isinstance(value, str) or "$" not in value:
+            return value
+        if whole := re.fullmatch(r"\$(\w+)( [a-z]+)?", value):
+            if whole[1] not in self._leaf.ports and whole[1] not in self._given.element.attributes:
+                return value if self._is_word(whole[1]) else _MISSING
+            found = self._port(whole[1])
+            if whole[2] is None or found is _MISSING:
+                return found
+            if isinstance(found, str) and found.startswith("$"):
+                return found if whole[2] == " s" else f"= {found} / 1000"
+            return f"{found:g}{whole[2]}" if isinstance(found, float) else f"{found}{whole[2]}"
+        return self._in_expression(value)
+
+    def _is_word(self, name: str) -> bool:
+        return self._given.writer.project.mapping.is_word(name)
+
+    def _in_expression(self, text: str) -> Any:
+        def put(found: re.Match[str]) -> str:
+            if self._is_word(found[1]) and found[1] not in self._leaf.ports:
+                return found[0]
+            value = self._port(found[1])
+            if value is _MISSING:
+                raise Refused("port", f"the port {found[1]!r} is missing")
+            if isinstance(value, str) and value.startswith("$"):
+                return value
+            return repr(value) if not isinstance(value, bool) else str(value).lower()
+
+        return re.sub(r"\$(\w+)", put, text)

@@ -1,0 +1,85 @@
+"""Names and values of the XML as names and values of ours."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+
+from bt_actions.importing.project import Definition
+from bt_actions.importing.scripts import Refused
+from bt_actions.importing.text import Node
+
+_LONGEST_NAME = 120
+
+
+def identifier(text: str) -> str:
+    """Return a name of ours that is as near to a text as can be."""
+    word = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")
+    return word if re.match("[A-Za-z]", word) else f"x{word}"
+
+
+def input_name(name: str, *, taken: bool) -> str:
+    """Return the name of an input; `taken` where an output has the variable's."""
+    return f"{identifier(name)}_in" if taken else identifier(name)
+
+
+def milliseconds(number: int) -> str:
+    """Return a duration."""
+    return f"{number // 1000} s" if number % 1000 == 0 and number else f"{number} ms"
+
+
+def node_name(text: str) -> str:
+    """Return a text that can be the name of a node."""
+    name = "".join(char if char.isprintable() and char not in ":$#" else " " for char in text)
+    return " ".join(name.split())[:_LONGEST_NAME] or "unnamed"
+
+
+def in_sequence(name: str, nodes: list[Node], kind: str = "sequence") -> Node:
+    """Return some nodes as one."""
+    return nodes[0] if len(nodes) == 1 else Node({kind: name, "children": nodes})
+
+
+def value_of(text: str, kind: str) -> object:
+    """Return what a text of the XML is, of a type. Raises Refused."""
+    if text.startswith("json:"):
+        try:
+            return json.loads(text.removeprefix("json:"))
+        except ValueError:
+            raise Refused("port", "it is no JSON") from None
+    if "/" in kind:
+        raise Refused("text_of_message")
+    if kind.endswith("]"):
+        return [value_of(each, kind.partition("[")[0]) for each in re.split("[;,]", text) if each]
+    if kind == "string":
+        return text.replace("$", "$$")
+    if kind == "bool" or text in ("true", "false"):
+        return text.lower() in ("true", "1")
+    if re.fullmatch(r"[-+]?\d+", text):
+        return int(text)
+    try:
+        return float(text)
+    except ValueError:
+        return text.replace("$", "$$")
+
+
+class Scope:
+    """The names of a tree of the XML, and what stands for each behind a dollar sign here."""
+
+    def __init__(
+        self,
+        definition: Definition,
+        prefix: str = "",
+        outer: Callable[[str], str | None] | None = None,
+    ) -> None:
+        self.definition = definition
+        self._prefix, self._outer = prefix, outer
+        self.literals: dict[str, object] = {}
+        """Ports that were given a value, of a tree that is written into its caller."""
+        self.topics: dict[str, str] = {}
+
+    def __getitem__(self, name: str) -> str:
+        outer = self._outer(name) if self._outer is not None else None
+        if outer is not None:
+            return outer
+        return self.topics.get(name) or f"{self._prefix}{identifier(name)}"

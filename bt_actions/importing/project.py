@@ -1,0 +1,437 @@
+"""The trees of some files, and which of their variables each reads and writes.
+
+Names of variables are those of the XML here. A subtree's ports are other names of its caller's
+variables, so what is done to a port is done to what the caller gives.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bt_actions.importing.mapping import Leaf, Map, texts_in
+from bt_actions.importing.reading import Element, XmlError, read_file
+from bt_actions.importing.report import Report, Verdict
+from bt_actions.importing.scripts import (
+    Part,
+    ScriptError,
+    Sort,
+    Sorts,
+    Statement,
+    condition,
+    names_in,
+    statements,
+)
+
+CONDITIONS = ("_failureIf", "_successIf", "_skipIf", "_while")
+AFTER = ("_onSuccess", "_onFailure", "_onHalted", "_post")
+SUBTREES = ("SubTree", "SubTreePlus", "Subtree")
+LOOPS = ("LoopInt", "LoopDouble", "LoopBool", "LoopString", "ForEach")
+_CALLED = ("Action", "Condition", "Control", "Decorator")
+_OWN = ("ID", "name", "_autoremap", "__autoremap", "__shared_blackboard", "_description", "_uid",
+        "_fullpath")  # fmt: skip
+"""Attributes that are no ports."""
+_MOST_FILES = 200
+_VARIABLE = re.compile(r"\s*\$?\{\s*([^{}]*?)\s*\}\s*")
+
+
+def kind_of(element: Element) -> str:
+    """Return the ID of a node, however it is written."""
+    return element.attributes.get("ID", element.tag) if element.tag in _CALLED else element.tag
+
+
+def variable_in(text: str, port: str) -> str | None:
+    """Return the variable that a port's text names, `{=}` being the port's own; else None."""
+    found = _VARIABLE.fullmatch(text)
+    if found is None:
+        return None
+    return port if found[1] == "=" else found[1]
+
+
+def is_shared(element: Element) -> bool:
+    """Return whether a subtree shares all names with its caller."""
+    wanted = ("_autoremap", "__autoremap", "__shared_blackboard")
+    return any(element.attributes.get(name) in ("true", "1") for name in wanted)
+
+
+def ports_of(element: Element) -> Iterator[tuple[str, str]]:
+    """Yield the attributes of a node that are ports."""
+    for name, text in element.attributes.items():
+        if name not in (*_OWN, *CONDITIONS, *AFTER):
+            yield name, text
+
+
+@dataclass(slots=True)
+class Definition:
+    """A tree of the XML."""
+
+    name: str
+    element: Element
+    version: int
+    """3 or 4: of the format."""
+    accesses: dict[str, str] = field(default_factory=dict)
+    """By variable: `r`, `w`, `rw` or `wr`, what is done first standing first."""
+    done: bool = False
+
+    @property
+    def root(self) -> Element | None:
+        """The one node below it, or None."""
+        return self.element.children[0] if len(self.element.children) == 1 else None
+
+    def reads_first(self, name: str) -> bool:
+        """Return whether a variable is read before anything in the tree writes it."""
+        return self.accesses.get(name, "").startswith("r")
+
+    def writes(self, name: str) -> bool:
+        """Return whether the tree writes a variable."""
+        return "w" in self.accesses.get(name, "")
+
+
+class Project:
+    """All files of an import."""
+
+    def __init__(self, paths: list[Path], mapping: Map, report: Report) -> None:
+        self.mapping, self.report = mapping, report
+        self.trees: dict[str, Definition] = {}
+        self.models: dict[str, dict[str, str]] = {}
+        """By ID: the directions of the ports."""
+        self.failed: list[XmlError] = []
+        self.sorts = Sorts()
+        self.types: dict[str, str] = {}
+        """By variable: the type of a port that it is given to."""
+        self._alike: dict[str, set[str]] = {}
+        """By variable: those that it is given to, or gets its value from."""
+        self._given = {path.resolve().parent for path in paths}
+        self._read: set[Path] = set()
+        for path in paths:
+            self._add_file(path)
+        for definition in self.trees.values():
+            for element in definition.element.walk():
+                self._note(element)
+        self.sorts.settle()
+        self._share_types()
+        for definition in self.trees.values():
+            self._follow(definition)
+
+    # Files
+
+    def _add_file(self, path: Path) -> None:
+        real = path.resolve()
+        if real in self._read or len(self._read) >= _MOST_FILES:
+            return
+        self._read.add(real)
+        try:
+            root = read_file(path)
+        except XmlError as error:
+            self.failed.append(error)
+            return
+        tops = root.children if root.tag == "root" else [root]
+        version = 4 if root.attributes.get("BTCPP_format", "").startswith("4") else 3
+        if root.comments and tops and root is not tops[0]:
+            tops[0].comments[:0] = root.comments
+        for element in tops:
+            if element.tag == "include":
+                self._include(element, path)
+            elif element.tag == "TreeNodesModel":
+                self._models(element)
+            elif element.tag == "BehaviorTree":
+                self._add_tree(element, path, version)
+            elif element is not root:
+                self.report.tree(element, element.tag, Verdict.DROPPED, "it is no tree")
+            else:
+                whole = Element("BehaviorTree", {}, element.file, element.line, element.column)
+                whole.children = [element]
+                self._add_tree(whole, path, version)
+
+    def _add_tree(self, element: Element, path: Path, version: int) -> None:
+        name = element.attributes.get("ID", path.stem)
+        if name in self.trees:
+            self.report.tree(element, name, Verdict.DROPPED, "a tree of that name was read before")
+            return
+        self.trees[name] = Definition(name, element, version)
+
+    def _include(self, element: Element, path: Path) -> None:
+        wanted = element.attributes.get("path", "")
+        if "ros_pkg" in element.attributes or not wanted:
+            why = "a package's file is not looked for: name it on the command line, too"
+            self.report.tree(element, f"include {wanted}", Verdict.REFUSED, why)
+            return
+        found = path.parent / wanted
+        real = found.resolve()
+        if real in self._read:
+            return
+        if not any(real.is_relative_to(folder) for folder in self._given):
+            why = "it is outside of the folders of the files: name it on the command line, too"
+            self.report.tree(element, f"include {wanted}", Verdict.REFUSED, why)
+        elif not found.is_file():
+            self.report.tree(element, f"include {wanted}", Verdict.REFUSED, "there is no such file")
+        else:
+            self._add_file(found)
+
+    def _models(self, element: Element) -> None:
+        for model in element.children:
+            ports = self.models.setdefault(model.attributes.get("ID", model.tag), {})
+            for port in model.children:
+                ports[port.attributes.get("name", "")] = port.tag.removesuffix("_port")
+
+    # What variables are
+
+    def _note(self, element: Element) -> None:
+        """Take note of what a node tells of the sorts and types of variables."""
+        attributes, kind = element.attributes, kind_of(element)
+        for code in (*AFTER, "code") if kind == "Script" else AFTER:
+            found = self._statements(attributes.get(code, ""))
+            self.sorts.add(found)
+            for key, _, part in found:
+                self._link(key, *_carried(part))
+        for code in (*CONDITIONS, "code", "if") if kind != "Script" else CONDITIONS:
+            try:
+                self.sorts.add_condition(condition(attributes[code]))
+            except (KeyError, ScriptError):
+                continue
+        if kind == "SetBlackboard":
+            key = attributes.get("output_key", "").strip("{}")
+            value = attributes.get("value", "")
+            if (other := variable_in(value, "value")) is not None:
+                self.sorts.alike(key, other)
+                self._link(key, other)
+            elif not value.startswith("json:"):
+                self.sorts.add_text(key, value)
+        leaf = self.mapping.leaves.get(kind)
+        cases = {_sort_of_text(text) for port, text in attributes.items() if port[:5] == "case_"}
+        for port, text in ports_of(element):
+            name = variable_in(text, port)
+            if name is not None and len(cases) == 1 and port == "variable":
+                self.sorts.use(name, *cases)
+            kind_of_port = leaf.type_of(port) if leaf is not None else ""
+            if port in ("value_A", "value_B"):
+                kind_of_port = COMPARED.get(kind, "")
+            if kind == "GoalUpdater":
+                kind_of_port = "geometry_msgs/msg/PoseStamped"
+            if kind in LOOPS and port == "queue":
+                kind_of_port = {"LoopString": "string[]", "LoopBool": "bool[]"}.get(
+                    kind, "float64[]"
+                )
+            if port in ("num_cycles", "num_attempts", "msec", "delay_msec"):
+                kind_of_port = "int64"
+            if kind in SUBTREES and name is not None:
+                self._link(port, name)
+                self.sorts.alike(port, name)
+            if kind in SUBTREES and name is None and not text.startswith("json:"):
+                self.sorts.add_text(port, text)
+            if name is not None and kind in LOOPS and port == "value":
+                self.sorts.use(name, Sort.TEXT if kind == "LoopString" else Sort.NUMBER)
+            if name is not None and kind_of_port:
+                self.types.setdefault(name, kind_of_port)
+                if (sort := _sort_of(kind_of_port)) is not None:
+                    self.sorts.use(name, sort)
+
+    def _link(self, *names: str) -> None:
+        for name in names:
+            self._alike.setdefault(name, set()).update(names)
+
+    def _share_types(self) -> None:
+        """Give the types of ports to all variables that have their values."""
+        waiting = list(self.types.items())
+        while waiting:
+            name, kind = waiting.pop()
+            for other in self._alike.get(name, ()):
+                if other and other not in self.types:
+                    self.types[other] = kind
+                    waiting.append((other, kind))
+
+    def reaches(self, definition: Definition, other: Definition) -> bool:
+        """Return whether a tree is another one, or holds it."""
+        waiting, seen = [definition], set()
+        while waiting:
+            found = waiting.pop()
+            if found is other:
+                return True
+            if found.name not in seen:
+                seen.add(found.name)
+                names = (each.attributes.get("ID", "") for each in found.element.walk()
+                         if kind_of(each) in SUBTREES)  # fmt: skip
+                waiting += [self.trees[name] for name in names if name in self.trees]
+        return False
+
+    def type_of(self, name: str) -> str:
+        """Return the type of an input or output."""
+        sort = self.sorts[name]
+        known = self.types.get(name, "")
+        if sort is Sort.TEXT or (sort is not Sort.ANY and not known):
+            return str(sort.value)
+        return known or "string"
+
+    def knows(self, name: str) -> bool:
+        """Return whether anything tells the type of a variable."""
+        return name in self.types or self.sorts[name] is not Sort.ANY
+
+    @staticmethod
+    def _statements(code: str) -> tuple[Statement, ...]:
+        try:
+            return statements(code)
+        except ScriptError:
+            return ()
+
+    # What is done with them
+
+    def _follow(self, definition: Definition) -> None:
+        if definition.done:
+            return
+        definition.done = True  # a tree that holds itself is refused elsewhere
+        for element in definition.element.children:
+            for name, access in self.accesses(element):
+                if name in self.mapping.constants:
+                    continue
+                before = definition.accesses.get(name, "")
+                if access not in before:
+                    definition.accesses[name] = before + access
+
+    def accesses(self, element: Element) -> Iterator[tuple[str, str]]:
+        """Yield each variable that a node and those below it read (`r`) or write (`w`)."""
+        attributes, kind = element.attributes, kind_of(element)
+        for name in CONDITIONS:
+            yield from self._asked(attributes.get(name, ""))
+        if kind in SUBTREES:
+            yield from self._of_subtree(element)
+        elif kind == "Script" or kind == "ScriptCondition":
+            yield from self._run(attributes.get("code", ""))
+        elif kind == "Precondition":
+            yield from self._asked(attributes.get("if", ""))
+        elif kind == "SetBlackboard":
+            if (value := variable_in(attributes.get("value", ""), "value")) is not None:
+                yield value, "r"
+            yield attributes.get("output_key", "").strip("{} "), "w"
+        else:
+            yield from self._of_ports(element, kind)
+        for child in element.children:
+            yield from self.accesses(child)
+        for name in AFTER:
+            yield from self._run(attributes.get(name, ""))
+
+    def _of_ports(self, element: Element, kind: str) -> Iterator[tuple[str, str]]:
+        leaf, directions = self.mapping.leaves.get(kind), self.directions(kind)
+        found = []
+        used = _ports_used(leaf) if leaf is not None else None
+        for port, text in ports_of(element):
+            name = variable_in(text, port)
+            if name is None or (used is not None and port not in used):
+                continue
+            if leaf is None and kind not in READ_BY_KIND:
+                continue  # a stub reads and writes nothing
+            found.append((name, directions.get(port, "input")))
+        yield from ((name, "r") for name, direction in found if direction != "output")
+        yield from ((name, "w") for name, direction in found if direction != "input")
+
+    def directions(self, kind: str) -> dict[str, str]:
+        """Return the directions of a kind's ports, as far as they are known."""
+        if kind in LOOPS:
+            return {"value": "output"}
+        if kind in WRITTEN_BY_KIND:
+            return {WRITTEN_BY_KIND[kind]: "output"}
+        leaf = self.mapping.leaves.get(kind)
+        known = dict(self.models.get(kind, {}))
+        if leaf is not None:
+            known.update(dict.fromkeys(leaf.outputs, "output"))
+        return known
+
+    def _of_subtree(self, element: Element) -> Iterator[tuple[str, str]]:
+        inner = self.trees.get(element.attributes.get("ID", ""))
+        if inner is None:
+            return
+        self._follow(inner)
+        ports = dict(ports_of(element))
+        for name, access in inner.accesses.items():
+            outer = outer_name(element, inner, name)
+            if outer is None and name not in ports and access.startswith("r"):
+                outer = name  # it has no value there, and becomes an input here
+            if outer is not None:
+                yield from ((outer, each) for each in access)
+
+    def _run(self, code: str) -> Iterator[tuple[str, str]]:
+        try:
+            found = statements(code)
+        except ScriptError:
+            return
+        for name, sign, value in found:
+            yield from ((each, "r") for each in names_in(value))
+            if name and sign not in (":=", "="):
+                yield name, "r"
+            if name:
+                yield name, "w"
+
+    def _asked(self, code: str) -> Iterator[tuple[str, str]]:
+        try:
+            yield from ((name, "r") for name in names_in(condition(code)))
+        except ScriptError:
+            return
+
+
+SELECTORS = {
+    f"{what[0].upper()}{what[1:]}Selector".replace("_c", "C").replace("_h", "H"): f"selected_{what}"
+    for what in ("planner", "controller", "smoother", "goal_checker", "progress_checker",
+                 "path_handler")
+}  # fmt: skip
+"""Nav2's nodes that take a name from a topic, and the port that they write."""
+COMPARED = {
+    "BlackboardCheckInt": "int64",
+    "BlackboardCheckDouble": "float64",
+    "BlackboardCheckString": "string",
+    "BlackboardCheckBool": "bool",
+}
+"""Decorators of BehaviorTree.CPP 3 that compare two values, and the type of these."""
+READ_BY_KIND = frozenset(
+    {"Repeat", "RetryUntilSuccessful", "RetryUntilSuccesful", "Timeout", "Delay", "Sleep",
+     *(f"Switch{cases}" for cases in range(2, 7)), "GoalUpdater", *SELECTORS, *LOOPS, *COMPARED}
+)  # fmt: skip
+"""Kinds with ports that are not in a map."""
+WRITTEN_BY_KIND = {"GoalUpdater": "output_goal", **SELECTORS}
+"""Kinds that are not in a map, and the port that they write."""
+
+
+def outer_name(element: Element, inner: Definition, name: str) -> str | None:
+    """Return the caller's variable that a name of its subtree stands for, or None."""
+    ports = dict(ports_of(element))
+    if name.startswith("@"):
+        return name
+    if name in ports:
+        text = ports[name]
+        if inner.version == 3 and element.tag == "SubTree" and re.fullmatch(r"\w+", text):
+            return text  # as it names a variable in the format 3
+        return variable_in(text, name)
+    private = name.startswith("_") and inner.version == 4
+    return name if is_shared(element) and not private else None
+
+
+def _carried(value: Part) -> Iterator[str]:
+    """Yield the names whose type a value has."""
+    if value.kind == "name":
+        yield value.signs[0]
+    elif value.kind == "if" or (value.kind == "binary" and value.signs[0] in "+-*"):
+        for part in value.parts[value.kind == "if" :]:
+            yield from _carried(part)
+
+
+def _ports_used(leaf: Leaf) -> set[str]:
+    texts = " ".join(texts_in(leaf.node))
+    return {*re.findall(r"\$(\w+)", texts), *leaf.outputs}
+
+
+def _sort_of_text(text: str) -> Sort:
+    return Sort.NUMBER if re.fullmatch(r"-?\d+(\.\d*)?", text) else Sort.TEXT
+
+
+def _sort_of(kind: str) -> Sort | None:
+    if kind == "string":
+        return Sort.TEXT
+    if kind == "bool":
+        return Sort.TRUTH
+    return Sort.NUMBER if re.fullmatch(r"u?int\d+|float\d+|byte", kind) else None
+
+
+def of_json(text: str) -> object:
+    """Return the value of a text behind `json:`. Raises ValueError."""
+    return json.loads(text.removeprefix("json:"))
