@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 from bt_actions.importing.names import Scope, milliseconds, node_name
-from bt_actions.importing.project import Project, kind_of, variable_in
+from bt_actions.importing.project import SUBTREES, Project, kind_of, variable_in
 from bt_actions.importing.reading import Element
 from bt_actions.importing.report import Report, Verdict
 from bt_actions.importing.scripts import Refused
@@ -93,6 +93,11 @@ class Given:
     def name(self, default: str = "") -> str:
         """Return the node's name."""
         return node_name(self.element.attributes.get("name", "") or default or self.kind)
+
+    @property
+    def around(self) -> str:
+        """The kind of the node around it, or ""."""
+        return next((kind for kind in self.writer.above[-2::-1] if kind not in SUBTREES), "")
 
     def named(self, node: Node) -> Node:
         """Give a node, whose kind says enough, the name that the XML has."""

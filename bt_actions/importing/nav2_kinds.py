@@ -9,6 +9,7 @@ from bt_actions.importing.report import Verdict
 from bt_actions.importing.scripts import Refused
 from bt_actions.importing.text import Node
 
+_PACED = ("PipelineSequence", "Repeat", "KeepRunningUntilFailure")
 _AT_ONCE = ("check", "set", "log", "success", "failure", "publish")
 
 
@@ -44,11 +45,7 @@ def _pipeline(given: Given) -> Node:
 def _rate(given: Given) -> Node:
     text = given.text("hz", "10.0")
     child = given.only_child()
-    if given.writer.above[-2:-1] not in (
-        ["PipelineSequence"],
-        ["Repeat"],
-        ["KeepRunningUntilFailure"],
-    ):
+    if given.around not in _PACED:
         given.converted("hz", "only in a pipeline does it keep to a rate, there as well")
         given.differs("dropped: its parent begins it anew at each tick, so that it paces nothing")
         return child
@@ -63,7 +60,7 @@ def _when_new(given: Given) -> Node:
     for name in ("goal", "goals", "input_goal", "input_goals"):
         given.dropped(name, "an input does not change in a run")
     child = given.only_child()
-    if given.writer.above[-2:-1] == ["PipelineSequence"]:
+    if given.around == "PipelineSequence":
         given.differs("a new goal is a new run: serve --policy replace")
         return Node(every="none", child=child)
     return child

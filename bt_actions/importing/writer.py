@@ -38,6 +38,8 @@ from bt_actions.importing.saying import asked, assignments
 from bt_actions.importing.scripts import Refused, ScriptError
 from bt_actions.importing.text import Node
 
+_PACING = ("RateController", "GoalUpdatedController")
+"""What means something to the pipeline around it alone."""
 _CONCURRENT = re.compile(r"Parallel|Reactive|Pipeline|WhileDoElse|Switch|Timeout|NonblockingSeq")
 STUBS = "leaves_to_write"
 """The module of the classes that stand for what nothing is known of."""
@@ -242,10 +244,11 @@ class Writer:
             return self.stub(given, {}, "it is not in the files that were given")
         if any(self.project.reaches(inner, around) for around in self._inside):
             raise Refused("recursion")
-        shares = any(outer_name(element, inner, name) is not None for name in inner.accesses)
+        shares = kind_of(inner.root) in _PACING or any(
+            outer_name(element, inner, name) is not None for name in inner.accesses
+        )
         concurrent = (
-            any(_CONCURRENT.search(kind) or kind.endswith("\0") for kind in self.above)
-            or "_while" in element.attributes
+            any(_CONCURRENT.search(kind) for kind in self.above) or "_while" in element.attributes
         )
         if shares and concurrent:
             return self._inlined(given, inner)

@@ -85,6 +85,19 @@ def test_every_node_is_accounted_for_and_what_was_written_is_formatted(
             assert format_source(Source(name, text)) == text
 
 
+def test_what_was_written_twice_is_told_as_it_is_worse(tmp_path: Path) -> None:
+    tree = '<SubTree ID="T" n="{n}"/>'
+    found = imported(
+        f"""<root BTCPP_format="4"><BehaviorTree ID="Main"><Sequence>
+        <Timeout msec="9">{tree}</Timeout><PipelineSequence>{tree}</PipelineSequence>
+        </Sequence></BehaviorTree><BehaviorTree ID="T">
+        <RateController hz="1"><Script code="n := 1"/></RateController></BehaviorTree></root>""",
+        tmp_path,
+    )
+    (rate,) = (each for each in found.report.nodes() if each.name == "RateController")
+    assert rate.verdict is Verdict.DIFFERS
+
+
 def test_what_is_refused_is_refused(tmp_path: Path) -> None:
     kinds = [name for name in rows() if name[0].isupper()]
     assert not {*kinds} & KINDS.keys() & nav2().leaves.keys()

@@ -1,4 +1,7 @@
-"""Trees of BehaviorTree.CPP, imported, do what they did there, tick by tick."""
+"""Trees of BehaviorTree.CPP, imported, do what they did there, tick by tick.
+
+Here a tenth of the cases is played; `make oracle` plays all.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,8 @@ from tests.support.oracle.cases import CASES, Case, read
 from tests.support.oracle.comparing import difference, listed
 from tests.support.oracle.importing import NotYet
 
-SAYABLE = 1837
-"""How many of the 4,000 cases the language can say; grows with each construct."""
+SAYABLE = 180
+"""How many of each tenth of the cases hold nothing refused, and words that there are."""
 
 
 def surprises(cases: list[Case], folder: Path) -> tuple[int, list[str]]:
@@ -35,12 +38,7 @@ def surprises(cases: list[Case], folder: Path) -> tuple[int, list[str]]:
 def test_a_tenth_of_the_cases_agree_or_are_listed(tmp_path: Path) -> None:
     played, found = surprises(list(read())[::10], tmp_path)
     assert found == []
-    assert played > SAYABLE / 12
-
-
-@pytest.mark.slow
-def test_all_cases_agree_or_are_listed(tmp_path: Path) -> None:
-    assert surprises(list(read()), tmp_path) == (SAYABLE, [])
+    assert played >= SAYABLE
 
 
 def test_a_tree_that_is_imported_wrongly_is_found_out(
