@@ -6,8 +6,10 @@ bounds is counted in a `Cut`, and not looked at. A ROS message is recognised by 
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from bt_actions.utilities.plain_data import field_of, plain
@@ -68,8 +70,7 @@ class _Snapshot:
             return self._text(bytes(value))
         if depth >= DEEP:
             return Cut((), 1)
-        if (types := getattr(type(value), "get_fields_and_field_types", None)) is not None:
-            names = types()
+        if names := _fields_of(type(value)):  # type: ignore[arg-type]  # a class is hashable
             fields = ((name, field_of(value, name, names)) for name in names)
             return self._mapping(fields, len(names), depth)
         if isinstance(value, Mapping):
@@ -92,6 +93,10 @@ class _Snapshot:
         count, room = len(items), max(0, min(self._fields, self._size // 8))
         first: Any = items[:room] if hasattr(items, "__getitem__") else items
         taken: Any = plain(first) if hasattr(first, "tolist") else first
+        if type(first) is array:  # of numbers of the machine
+            self._fields -= len(taken)
+            self._size -= 8 * len(taken)
+            return tuple(taken) if len(taken) == count else Cut(tuple(taken), count - len(taken))
         kept: list[Value] = []
         for item in taken:
             if self._full:
@@ -111,6 +116,13 @@ class _Snapshot:
     @property
     def _full(self) -> bool:
         return self._fields <= 0 or self._size <= 0
+
+
+@lru_cache(maxsize=256)
+def _fields_of(kind: Any) -> Mapping[str, str] | None:
+    """The fields of a message type with their types as rosidl names them; None of another type."""
+    asked = getattr(kind, "get_fields_and_field_types", None)
+    return None if asked is None else asked()
 
 
 def _bounded(value: bool | int | float | None) -> Value:

@@ -1,9 +1,10 @@
 """The events of one runner in one order, and those who read them.
 
-An event gets number and moment together, under the stream's lock, on the thread on which it
-happens: the receiving thread for what a server says, the ticking thread for a node whose tick
-returns. Each reader has a queue of its own, so none waits for another, and no producer waits for
-any. Where nobody reads, nothing is made.
+An event gets its moment and its place in the order together, under the stream's lock, on the thread
+on which it happens: the receiving thread for what a server says, the ticking thread for a node
+whose tick returns. That thread notes the event's fields, and no more: the first reader that takes
+makes the events of them, for all readers. Each reader has a queue of its own, so none waits for
+another, and no producer waits for any. Where nobody reads, nothing is noted.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from bisect import bisect, insort
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 from py_trees.common import Status
 
@@ -46,18 +47,23 @@ SLEW = 0.001
 """How much faster or slower the wall clock may run without having jumped, as NTP lets it."""
 Clock = Callable[[], tuple[float, float, float]]
 """The steady, the wall and the ROS clock, in seconds."""
+_Note: TypeAlias = tuple[
+    Callable[..., Event], tuple[float, float, float], tuple[Any, ...], dict[str, Any]
+]
+"""The kind of an event, its moment on the clocks, and its fields."""
 
 
 class Reader:
     """The events for one reader, from `Stream.reader` on; any thread may take them."""
 
-    def __init__(self, poke: Callable[[], None], room: int) -> None:
+    def __init__(self, make: Callable[[], None], poke: Callable[[], None], room: int) -> None:
         self._events: deque[Event] = deque()
-        self._poke, self._room = poke, room
+        self._make, self.poke, self._room = make, poke, room
         self._lost = 0
 
     def take(self) -> list[Event]:
         """Return what has come since the last call, in order; EventsLost for what was left out."""
+        self._make()
         events = []
         while self._events:
             events.append(self._events.popleft())
@@ -68,11 +74,10 @@ class Reader:
         if len(self._events) >= self._room and _is_spared(event):
             self._lost += 1
             return
-        new = [EventsLost(event.at, self._lost), event] if self._lost else [event]
-        self._lost = 0
-        self._events.extend(new)
-        if len(self._events) <= len(new):  # looked at last: the reader takes without the lock
-            self._poke()
+        if self._lost:
+            self._events.append(EventsLost(event.at, self._lost))
+            self._lost = 0
+        self._events.append(event)
 
 
 def _is_spared(event: Event) -> bool:
@@ -87,6 +92,10 @@ class Stream:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._lock = threading.Lock()
+        """Of what is noted."""
+        self._making = threading.Lock()
+        """Of what is made of it; whoever wants both takes this one first."""
+        self._noted: deque[_Note] = deque()
         self._readers: tuple[Reader, ...] = ()
         self._number = 0
         self._nodes: tuple[RunBegan | NodesAdded | NodesRemoved, ...] = ()
@@ -103,11 +112,12 @@ class Stream:
     def reader(self, poke: Callable[[], None] = lambda: None, room: int = ROOM) -> Reader:
         """Return a reader of all events from now on, behind those that tell of the tree's nodes.
 
-        `poke` is called, on the thread of an event and under the lock, where one comes to an empty
-        queue; it must not wait, and a reader whose `poke` raises is let go of.
+        `poke` is called, on the thread of an event and under the lock, where one comes and all
+        before it were taken; it must not wait, and a reader whose `poke` raises is let go of.
         """
-        reader = Reader(poke, room)
-        with self._lock:
+        reader = Reader(self._make, poke, room)
+        with self._making, self._lock:
+            self._make_noted()
             for event in self._nodes:
                 reader.put(event)
             self._readers = (*self._readers, reader)
@@ -115,23 +125,48 @@ class Stream:
 
     def leave(self, reader: Reader) -> None:
         """Let go of a reader."""
-        with self._lock:
+        with self._making, self._lock:
+            self._make_noted()
             self._readers = tuple(each for each in self._readers if each is not reader)
 
     def add(self, kind: Callable[..., Event], *args: Any, **fields: Any) -> None:
-        """Make an event of `kind` of what follows its moment, and give it to all readers."""
+        """Note an event of `kind`, of what follows its moment, for all readers.
+
+        What is given is not looked at until somebody reads: nobody may change it.
+        """
         if not self._readers:
             return
+        if kind is StopWanted:
+            self.stop_is_told = True
         with self._lock:
-            now = self._clock()
-            for jump in self._jumps(now):
-                self._give(ClockJumped(self._moment(now), *jump))
-            self._give(kind(self._moment(now), *args, **fields))
+            self._noted.append((kind, self._clock(), args, fields))
+            if len(self._noted) == 1:
+                self._poke()
+        if len(self._noted) >= ROOM:  # nobody takes: the readers' queues know what can be spared
+            self._make()
 
     def now(self) -> tuple[float, float, float]:
         """Return this moment on all clocks; the readers have all events before it."""
         with self._lock:
             return self._clock()
+
+    def _poke(self) -> None:
+        for reader in self._readers:
+            try:
+                reader.poke()
+            except Exception:  # noqa: BLE001 - any; nobody else must suffer from it
+                self._readers = tuple(each for each in self._readers if each is not reader)
+
+    def _make(self) -> None:
+        with self._making:
+            self._make_noted()
+
+    def _make_noted(self) -> None:
+        while self._noted:
+            kind, now, args, fields = self._noted.popleft()
+            for jump in self._jumps(now):
+                self._give(ClockJumped(self._moment(now), *jump))
+            self._give(kind(self._moment(now), *args, **fields))
 
     def _moment(self, now: tuple[float, float, float]) -> Moment:
         self._number += 1
@@ -144,13 +179,8 @@ class Stream:
             self._nodes += (event,)
             if len(self._nodes) > CHANGES and isinstance(began := self._nodes[0], RunBegan):
                 self._nodes = (replace(began, nodes=_nodes_after(self._nodes)),)
-        elif isinstance(event, StopWanted):
-            self.stop_is_told = True
         for reader in self._readers:
-            try:
-                reader.put(event)
-            except Exception:  # noqa: BLE001 - its poke: any; nobody else must suffer from it
-                self._readers = tuple(each for each in self._readers if each is not reader)
+            reader.put(event)
 
     def _jumps(self, now: tuple[float, float, float]) -> list[tuple[str, float]]:
         """Which clocks have jumped since the last event, and by how much."""

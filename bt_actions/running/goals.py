@@ -101,8 +101,10 @@ class RunGoals:
     def _note(self, handle: GoalHandle | None) -> None:
         if handle is not None:
             goal = handle.goal
-            is_news = handle in self._handles  # else its leaf is just beginning it
-            told = self._handles.setdefault(handle, _Told(self._teller.run_id))
+            told = self._handles.get(handle)
+            is_news = told is not None  # else its leaf is just beginning it
+            if told is None:
+                told = self._handles[handle] = _Told(self._teller.run_id)
             is_of_this_run = told.run_id == self._teller.run_id
             if self._teller.is_heard and is_of_this_run:
                 self._tell(handle, told)

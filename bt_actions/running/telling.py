@@ -28,6 +28,8 @@ from bt_actions.events.teller import Teller
 from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.traffic.backend import Backend
 
+FINE = 0.001
+"""Seconds for which a reading of the ROS clock counts."""
 _ALL = sys.maxsize
 
 
@@ -48,11 +50,12 @@ class TreeTeller(Teller):
     def __init__(self, tree: BehaviourTree, backend: Backend) -> None:
         self._tree, self._backend = tree, backend
         self._host = backend.traffic.host
+        self._wall = self._host.wall
         self._has_begun = False
         """Whether this run was told of."""
         self._overhears = False
         """Whether what clients of the blackboard write is told."""
-        self._ros, self._last = 0.0, 0
+        self._ros, self._asked, self._last = 0.0, -FINE, 0
         self._hidden: dict[Behaviour, str] = {}
         """The latest messages of nodes that had read a secret: their parents may take them over."""
         self.asked_by = "", ""
@@ -62,9 +65,12 @@ class TreeTeller(Teller):
         super().__init__(Stream(self._moment), self._host.steady)
 
     def _moment(self) -> tuple[float, float, float]:
-        with contextlib.suppress(Exception):  # the node is destroyed
-            self._ros = self._backend.stamp() * 1e-9
-        return self._host.steady(), self._host.wall(), self._ros
+        steady = self._steady()
+        if steady - self._asked >= FINE:  # the ROS clock takes longer than the rest of an event
+            self._asked = steady
+            with contextlib.suppress(Exception):  # the node is destroyed
+                self._ros = self._backend.stamp() * 1e-9
+        return steady, self._wall(), self._ros
 
     def begin(self) -> None:
         """Take note that a run begins, which is told of when its tree is set up."""
@@ -136,20 +142,23 @@ class TreeTeller(Teller):
         """Tell the status that a node has now; on the ticking thread, as its tick returns."""
         if not self.is_heard:
             return
-        message, status, more = node.feedback_message, node.status, dict[str, object]()
+        message, status = node.feedback_message, node.status
+        by_itself, warning, due_in = False, "", None
         is_secret = self.reads_secret or bool(getattr(node, "reads_secret", False))
-        from_below = any(self._hidden.get(child) == message for child in node.children)
+        hidden = self._hidden
+        from_below = hidden and any(hidden.get(child) == message for child in node.children)
         if message and (is_secret or from_below):
-            self._hidden[node], message = message, HIDDEN
-        self.claim(node)
+            hidden[node], message = message, HIDDEN
+        if self.has_news:
+            self.claim(node)
         if status is Status.FAILURE:
             self.all_written()
-            more["by_itself"] = bool(getattr(node, "refused", False))
+            by_itself = bool(getattr(node, "refused", False))
         elif status is Status.SUCCESS:
-            more["warning"] = str(getattr(node, "warning", ""))
-        elif status is Status.RUNNING and isinstance(node, Timed):
-            more["due_in"] = None if is_secret else node.left_to_run()
-        self.tell(NodeChanged, node, status, message, **more)
+            warning = str(getattr(node, "warning", ""))
+        elif status is Status.RUNNING and isinstance(node, Timed) and not is_secret:
+            due_in = node.left_to_run()
+        self.tell(NodeChanged, node, status, message, by_itself, warning, due_in)
 
     def goes_on(self, node: Behaviour) -> None:
         """Take note that a node that runs has been ticked."""

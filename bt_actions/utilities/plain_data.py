@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 _NUMBERS = frozenset({bool, int, float})
+_PLAIN = frozenset({bool, int, float, str})
 _GREATEST = 3.402823466e38
 """Of the finite float32s."""
 
@@ -23,6 +24,8 @@ def numbers_only(items: Iterable[object]) -> bool:
 def scalar(value: object) -> object:
     """A numpy scalar, and a byte of ROS, as Python's own number; arrays stay as they are until
     somebody compares them."""
+    if type(value) in _PLAIN:
+        return value
     if isinstance(value, bytes) and len(value) == 1:
         return value[0]
     if type(value).__module__ == "numpy" and not getattr(value, "shape", ()):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import threading
 import time
+import weakref
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ from bt_actions.events import (
     EventsLost,
     FeedbackCame,
     GoalChanged,
+    Moment,
     Node,
     NodeChanged,
     NodesAdded,
@@ -23,7 +25,7 @@ from bt_actions.events import (
     RunBegan,
     RunEnded,
 )
-from bt_actions.events.stream import CHANGES, JUMP, Stream
+from bt_actions.events.stream import CHANGES, JUMP, ROOM, Stream
 from bt_actions.story.state import State
 from tests.support.stories import state_of
 
@@ -111,6 +113,45 @@ def test_where_nobody_reads_nothing_is_made(stream: Stream, clock: Clock) -> Non
     assert not stream.is_read
     assert clock.asked == 1
     assert [event.at.number for event in reader.take()] == [1]
+
+
+def test_an_event_is_made_once_for_all_readers_with_the_moment_at_which_it_was_noted(
+    stream: Stream, clock: Clock
+) -> None:
+    made: list[threading.Thread] = []
+
+    def paused(at: Moment) -> Event:
+        made.append(threading.current_thread())
+        return Paused(at, True)
+
+    one, other = stream.reader(), stream.reader()
+    noted = threading.Thread(target=stream.add, args=[paused])
+    noted.start()
+    noted.join()
+    assert not made
+    before = clock.steady
+    clock.move(5.0)
+    (event,) = one.take()
+    assert other.take() == [event]
+    assert event.at.steady == before
+    assert made == [threading.current_thread()]
+
+
+def test_what_nobody_takes_does_not_pile_up(stream: Stream) -> None:
+    class Kept(FeedbackCame):
+        """Feedback that is known to be there."""
+
+    alive = weakref.WeakSet[Kept]()
+
+    def kept(at: Moment) -> Event:
+        alive.add(event := Kept(at, 1, "ab", 0))
+        return event
+
+    reader = stream.reader(room=10)
+    for _ in range(ROOM):
+        stream.add(kept)
+    assert len(alive) == 10
+    assert len(reader.take()) == 10
 
 
 def test_a_reader_has_what_came_since_it_reads_and_none_waits_for_another(stream: Stream) -> None:
