@@ -47,8 +47,7 @@ FAMILIES = [
     recording.CHAINS,
     recording.TICKED,
 ]
-GATED = {"1", "2", "3", "4", "5", "8", "14"}
-SLACK = 1.25
+GATED = {"1", "2", "3", "4", "5", "8", "14", "15", "16"}
 PAGE = """\
 # How fast it is
 
@@ -79,8 +78,12 @@ journal showed that each ran once and in its order.
 - Row 11 cannot be less than 0.45: PyYAML's C parser, which gives us its events, and py_trees' own
   constructors take that much of the yardstick's time. Of 100 nodes, a tenth is what any file takes.
   That is in its growth, too; so is that large trees outgrow the processor's cache, in both.
-- `make bench-short`, which CI calls, measures rows 1 to 5, 8 and 14, and fails where one is
-  beyond its limit by more than a quarter in each of three tries.
+- In row 15 an action is told in nine events. The chain keeps Python's interpreter busy nearly all
+  the time, and an interpreter does one thing at a time: what the recorder's thread does for these
+  events, some 20 µs each, is time that the next action waits for. A second of work in each action
+  makes of that 0.02 %.
+- `make bench-short`, which CI calls, measures rows 1 to 5, 8 and 14 to 16, and fails where one is
+  beyond its limit by more than a quarter (row 16: three times) in each of three tries.
 """
 
 
@@ -132,7 +135,7 @@ def main() -> int:
             print(table(measured), flush=True)
             return measured
 
-        missed = hold_within(again, SLACK)
+        missed = hold_within(again)
         for each in missed:
             print(f"row {each.row.number} is beyond its limit: {each.value:.3g}")
         return 1 if missed else 0

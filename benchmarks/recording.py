@@ -202,6 +202,7 @@ TICKED = Family(
             ("alone", "p99"),
             0.2,
             is_difference=True,
+            slack=3.0,
         )
         for name in _READERS
         if name != "alone"

@@ -52,7 +52,7 @@ def test_only_what_is_beyond_its_limit_and_the_slack_in_each_try_fails(
     tries: list[float], missed: list[str]
 ) -> None:
     values: Iterator[float] = iter(tries)
-    failed = hold_within(lambda: [Measured(RATIO, taken((next(values), 1.0)))], 1.25)
+    failed = hold_within(lambda: [Measured(RATIO, taken((next(values), 1.0)))])
     assert [each.row.number for each in failed] == missed
     assert next(values, None) is None
 
