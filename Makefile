@@ -7,6 +7,7 @@ BIN := $(VENV)/bin
 COLCON := .colcon
 
 INTERFACES := $(shell find interfaces bt_actions/packages -type f -not -name '*.pyc')
+JAVASCRIPT := $(filter-out %/main.js %/other.js,$(wildcard bt_actions/*/*.js bt_actions/*/static/*.js))
 PROJECT := setup.py setup.cfg pyproject.toml package.xml $(shell find trees launch -name '*.y*ml' -o -name '*.launch.py' 2>/dev/null)
 
 # A ROS installation or another environment in the caller's shell must not leak into these.
@@ -39,10 +40,13 @@ docs: dev ## remake the pages and pictures that come from the code; `make test` 
 	$(BIN)/python scripts/python_doc.py
 	$(BIN)/python scripts/yaml_doc.py
 	$(BIN)/python scripts/pictures.py
+	$(BIN)/python -m scripts.screenshots
 
-lint: dev ## ruff: rules and formatting; bandit: security
+lint: dev ## ruff: rules and formatting; bandit: security; oxlint and oxfmt: the JavaScript
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/oxlint --deny-warnings bt_actions
+	$(BIN)/oxfmt --check $(JAVASCRIPT)
 	$(BIN)/bandit --quiet --recursive --configfile pyproject.toml bt_actions
 
 chaos: dev ## every scenario with killed processes and cut networks, and storms; writes docs/reliability.md
@@ -62,9 +66,10 @@ types: dev ## mypy --strict
 	$(BIN)/mypy --strict
 	$(BIN)/mypy --strict tests/typing/usage.py
 
-format: dev ## put the code into ruff's format
+format: dev ## put the code into the format of ruff and oxfmt
 	$(BIN)/ruff check --fix-only .
 	$(BIN)/ruff format .
+	$(BIN)/oxfmt $(JAVASCRIPT)
 
 colcon: $(COLCON)/venv.stamp ## build both packages with colcon and run the demo from what it installed
 	scripts/colcon.sh $(COLCON)

@@ -13,6 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 SCRIPT = runpy.run_path(str(ROOT / "scripts" / "pictures.py"))
 PICTURES: dict[Path, Path] = SCRIPT["PICTURES"]
+SCREENSHOTS: set[Path] = runpy.run_path(str(ROOT / "scripts" / "screenshots.py"))["PICTURES"]
 is_fresh: Callable[[Path], bool] = SCRIPT["is_fresh"]
 drawn: Callable[[Path], str] = SCRIPT["drawn"]
 
@@ -36,14 +37,20 @@ def test_a_picture_shows_its_tree_as_it_is_drawn_now(path: Path) -> None:
     assert is_fresh(path), f"{path} is stale: run `make docs`"
 
 
-def test_every_picture_that_a_page_shows_is_made_by_the_script() -> None:
+def test_every_picture_that_a_page_shows_is_made_by_a_script() -> None:
     shown = set()
     for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
         for target in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", page.read_text(encoding="utf-8")):
             shown.add((page.parent / target).resolve())
-    assert shown == set(PICTURES)
+    assert shown == PICTURES.keys() | SCREENSHOTS
     kept = {path for path in (ROOT / "docs" / "images").rglob("*") if path.is_file()}
-    assert kept == set(PICTURES)
+    assert kept == PICTURES.keys() | SCREENSHOTS
+
+
+def test_the_screenshots_are_small() -> None:
+    assert sum(path.stat().st_size for path in SCREENSHOTS) < 1_500_000
+    moving = (ROOT / "docs" / "images" / "page.webp").read_bytes()
+    assert moving.count(b"ANMF") > 10
 
 
 def test_a_picture_stays_fresh_where_the_fonts_are_others(picture: Path) -> None:
