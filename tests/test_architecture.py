@@ -131,6 +131,11 @@ def test_the_arrows_inside_of_document_point_down() -> None:
     assert arrows == set()
 
 
+def test_a_script_of_a_page_has_300_lines_at_most() -> None:
+    long = [path for path in ROOT.rglob("*.js") if len(path.read_text().splitlines()) > 300]
+    assert long == []
+
+
 def test_rclpy_stays_in_its_rooms() -> None:
     users = {
         name_of(path)

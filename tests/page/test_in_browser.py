@@ -5,67 +5,23 @@ Skipped where there is no Chromium with its chromedriver.
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
-from bt_actions.events import Event, Moment, RunBegan, TickLasts
-from tests.page.conftest import Begin, Going, Served
+from bt_actions.events import Moment, RunBegan, TickLasts
+from tests.page.conftest import SETTLED, SHIFTS, Beating, Begin, Page, Served
 from tests.page.test_feed import told_of
 from tests.support import browser as chromium
 from tests.support.every_kind import RUN_ID
 from tests.support.recordings import record
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing() or "-")
-SETTLED = "window.page?.settled"
 WHY = "document.getElementById('why').innerText"
 ROWS = "[...document.querySelectorAll('.row:not([hidden])')].map((one) => one.innerText)"
 
 
-class Page:
-    """The page of a server, in the window."""
-
-    def __init__(self, window: chromium.Browser, served: Served) -> None:
-        self.window, self.served = window, served
-        self.place = f"http://127.0.0.1:{served.port}/"
-
-    def open(self, address: str = "", width: int = 1440) -> chromium.Browser:
-        self.window.open("about:blank")
-        self.window.open(self.place + address, width=width, height=900)
-        assert self.window.wait_for(SETTLED)
-        return self.window
-
-    def text(self, where: str, words: str) -> str:
-        """Wait for words in an element; return its text."""
-        element = f"document.querySelector({where!r})"
-        self.window.wait_for(f"{element}?.innerText.includes(arguments[0])", words)
-        return str(self.window.run(f"return {element}.innerText"))
-
-
-@pytest.fixture
-def page(window: chromium.Browser, served: Served) -> Iterator[Page]:
-    """The page; the browser must have had nothing to complain about, nor asked another host."""
-    window.complaints()
-    shown = Page(window, served)
-    yield shown
-    asked = window.run("return performance.getEntriesByType('resource').map((one) => one.name)")
-    assert asked
-    assert [each for each in asked if not each.startswith(shown.place)] == []
-    refused = "net::ERR_CONNECTION_REFUSED", "net::ERR_INCOMPLETE_CHUNKED_ENCODING"
-    said = [each for each in window.complaints() if not any(word in each for word in refused)]
-    assert said == []
-
-
 # A run that is over
-
-
-@pytest.fixture
-def over(night: Path, monkeypatch: pytest.MonkeyPatch, page: Page) -> Page:
-    monkeypatch.setenv("XDG_STATE_HOME", str(night))
-    return page
 
 
 @pytest.mark.ros
@@ -191,42 +147,6 @@ return [...document.body.querySelectorAll("*")]
 
 
 # Runs that go on
-
-
-SHIFTS = """
-window.shifts = 0;
-new PerformanceObserver((list) => { for (const one of list.getEntries()) shifts += one.value; })
-  .observe({ type: "layout-shift" });
-"""
-"""Sums up by how much anything has moved on the page that nobody has asked to."""
-
-
-class Beating:
-    """A run whose process lives: its heartbeat goes on until it is told not to."""
-
-    def __init__(self, run: Going, events: list[Event]) -> None:
-        self._run, self._at, self._stopped = run, events[-1].at, threading.Event()
-        self._lock = threading.Lock()
-        self._seconds = 0.0
-        self._thread = threading.Thread(target=self._beat)
-        self._thread.start()
-
-    def _beat(self) -> None:
-        while not self._stopped.wait(0.2):
-            self._seconds += 0.2
-            at = self._at
-            with self._lock:
-                seconds = at.steady + self._seconds
-                self._run.writer.beat(seconds, at.wall + self._seconds, at.ros, 0.0)
-                self._run.writer.flush()
-
-    def write(self, events: list[Event]) -> None:
-        with self._lock:
-            self._run.write(events)
-
-    def stop(self) -> None:
-        self._stopped.set()
-        self._thread.join()
 
 
 def test_what_happens_appears_and_the_page_follows(page: Page, begin: Begin) -> None:

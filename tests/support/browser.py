@@ -78,7 +78,11 @@ class Browser:
             "if (found || performance.now() > end) done(found); else setTimeout(look, 20); };"
             "look();"
         )
-        return _call(f"{self._session}/execute/async", script=body, args=list(arguments))
+        return self.wait(body, *arguments)
+
+    def wait(self, script: str, *arguments: object) -> Any:
+        """What a function body in JavaScript hands to the last of its arguments, a function."""
+        return _call(f"{self._session}/execute/async", script=script, args=list(arguments))
 
     def keys(self, *names: str) -> None:
         """Press keys one after the other: names in KEYS, or single characters."""
@@ -97,6 +101,21 @@ class Browser:
         kind = "touch" if touch else "mouse"
         source = {"type": "pointer", "id": kind, "parameters": {"pointerType": kind}}
         self._act(source | {"actions": actions})
+
+    def drag(self, begin: tuple[float, float], end: tuple[float, float]) -> None:
+        """Press the mouse at one place of the window, move it to another, and let go."""
+        moves = [
+            {"type": "pointerMove", "duration": 0, "x": round(x), "y": round(y)}
+            for x, y in (begin, end)
+        ]
+        actions = [
+            moves[0],
+            {"type": "pointerDown", "button": 0},
+            moves[1],
+            {"type": "pointerUp", "button": 0},
+        ]
+        mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}}
+        self._act(mouse | {"actions": actions})
 
     def picture(self, path: Path) -> None:
         """Write what is seen as a PNG."""

@@ -5,44 +5,72 @@ import { status_glyph } from "./glyphs.js";
 import { clock, STATE } from "./words.js";
 
 const find = (id) => document.getElementById(id);
-const text = (node, value) => { if (node.textContent !== value) node.textContent = value; };
+const text = (node, value) => {
+  if (node.textContent !== value) node.textContent = value;
+};
 const LOOK = { SUCCESS: "success", FAILURE: "failure", INVALID: "stopped" };
 export const look_of = (one) => (one.written && !one.status ? "running" : LOOK[one.status] || "stopped");
 const when = (wall) => new Date(wall * 1000).toLocaleString();
 
 export function create_head(app) {
   // The switcher of runs.
-  const runs = find("runs"), opener = find("switch");
-  const shut = (focus) => { runs.hidden = true; opener.setAttribute("aria-expanded", "false"); if (focus) opener.focus(); };
+  const runs = find("runs"),
+    opener = find("switch");
+  const shut = (focus) => {
+    runs.hidden = true;
+    opener.setAttribute("aria-expanded", "false");
+    if (focus) opener.focus();
+  };
   opener.addEventListener("click", async () => {
     if (!runs.hidden) return shut();
     const all = await app.fetch_runs();
-    runs.replaceChildren(...all.slice(0, 30).map((one) => {
-      const option = el("button", { class: "opt", role: "option", "aria-selected": String(one.run_id === app.run.key), onclick: () => { shut(true); app.open(one.run_id); } });
-      option.append(status_glyph(look_of(one)), el("b", { text: one.tree }), el("span", { class: "num soft", text: one.seconds === null ? "" : clock(one.seconds) }),
-        el("span", { text: `${when(one.began)}  ·  ${one.run_id.slice(0, 8)}${one.cause ? `  ·  ${one.cause}` : ""}` }));
-      return option;
-    }));
+    runs.replaceChildren(
+      ...all.slice(0, 30).map((one) => {
+        const option = el("button", {
+          class: "opt",
+          role: "option",
+          "aria-selected": String(one.run_id === app.run.key),
+          onclick: () => {
+            shut(true);
+            app.open(one.run_id);
+          },
+        });
+        option.append(
+          status_glyph(look_of(one)),
+          el("b", { text: one.tree }),
+          el("span", { class: "num soft", text: one.seconds === null ? "" : clock(one.seconds) }),
+          el("span", {
+            text: `${when(one.began)}  ·  ${one.run_id.slice(0, 8)}${one.cause ? `  ·  ${one.cause}` : ""}`,
+          }),
+        );
+        return option;
+      }),
+    );
     runs.hidden = false;
     opener.setAttribute("aria-expanded", "true");
     (runs.querySelector("[aria-selected=true]") || runs.firstChild)?.focus();
   });
   runs.addEventListener("keydown", (event) => {
-    const options = [...runs.querySelectorAll(".opt")], at = options.indexOf(document.activeElement);
+    const options = [...runs.querySelectorAll(".opt")],
+      at = options.indexOf(document.activeElement);
     if (event.key === "Escape") shut(true);
     if (event.key === "ArrowDown") options[Math.min(at + 1, options.length - 1)].focus();
     if (event.key === "ArrowUp") options[Math.max(at - 1, 0)].focus();
     if (event.key.startsWith("Arrow")) event.preventDefault();
     event.stopPropagation();
   });
-  document.addEventListener("pointerdown", (event) => { if (!runs.hidden && !event.target.closest(".switch")) shut(); });
+  document.addEventListener("pointerdown", (event) => {
+    if (!runs.hidden && !event.target.closest(".switch")) shut();
+  });
 
   // The status of the run at the time that is shown, as far as that is known.
   function standing() {
-    const { run, s, link } = app, over = run.over && app.at_head;
+    const { run, s, link } = app,
+      over = run.over && app.at_head;
     if (run.gap_at(app.t)) return ["Not recorded", "stopped"];
     if (s.finished?.error && !s.stop) return STATE.failure;
-    if (s.finished) return { SUCCESS: STATE.success, FAILURE: STATE.failure, INVALID: ["Stopped", "stopped"] }[s.finished.status];
+    if (s.finished)
+      return { SUCCESS: STATE.success, FAILURE: STATE.failure, INVALID: ["Stopped", "stopped"] }[s.finished.status];
     if (over && !link.ended && !link.goes_on) return ["Never finished", "stopped"];
     if (s.paused) return ["Paused", "waiting"];
     if (s.stop) return ["Stopping", "cancel"];
@@ -51,44 +79,86 @@ export function create_head(app) {
   }
 
   function update() {
-    const { run, link } = app, { info } = run, small = app.narrow.matches;
+    const { run, link } = app,
+      { info } = run,
+      small = app.narrow.matches;
     text(find("tree-name"), info.tree || "…");
-    const { host, node, domain, simulation } = info.where || {}, place = find("tree-where");
-    text(place, info.wall ? [simulation && "simulated", host, when(info.wall), `run ${info.id.slice(0, 8)}`].filter(Boolean).join("  ·  ") : "");
+    const { host, node, domain, simulation } = info.where || {},
+      place = find("tree-where");
+    text(
+      place,
+      info.wall
+        ? [simulation && "simulated", host, when(info.wall), `run ${info.id.slice(0, 8)}`].filter(Boolean).join("  ·  ")
+        : "",
+    );
     place.title = [simulation, node, domain && `domain ${domain}`, info.id].filter(Boolean).join(", ");
-    const [word, look] = standing(), pill = find("status"), key = word + look;
+    const [word, look] = standing(),
+      pill = find("status"),
+      key = word + look;
     if (pill.dataset.k !== key) {
       pill.dataset.k = key;
       pill.className = `pill tone-${look}`;
       pill.replaceChildren(status_glyph(look), el("span", { text: word }));
-      document.title = `${word}: ${info.tree}`;
+      document.title = find("title").textContent = `${word}: ${info.tree}`;
     }
     text(find("elapsed"), clock(app.t));
-    const conn = find("conn"), ago = Math.floor(link.silence), of = small ? "" : "for ", { conn: now } = link;
-    if (conn.dataset.conn !== now) { conn.dataset.conn = now; conn.replaceChildren(el("i"), el("span")); document.body.dataset.conn = now; }
-    text(conn.lastChild, { live: "Live", stale: `Stale ${of}${ago} s`, lost: `Lost ${of}${ago} s`, replay: "Replay" }[now]);
-    conn.title = { live: "Events come", stale: "Nothing has come from the run, not even a heartbeat", lost: "The connection is gone; what is shown is what was last known", replay: "Nothing more comes; this is the record" }[now];
+    const conn = find("conn"),
+      ago = Math.floor(link.silence),
+      of = small ? "" : "for ",
+      { conn: now } = link;
+    if (conn.dataset.conn !== now) {
+      conn.dataset.conn = now;
+      conn.replaceChildren(el("i"), el("span"));
+      document.body.dataset.conn = now;
+    }
+    text(
+      conn.lastChild,
+      { live: "Live", stale: `Stale ${of}${ago} s`, lost: `Lost ${of}${ago} s`, replay: "Replay" }[now],
+    );
+    conn.title = {
+      live: "Events come",
+      stale: "Nothing has come from the run, not even a heartbeat",
+      lost: "The connection is gone; what is shown is what was last known",
+      replay: "Nothing more comes; this is the record",
+    }[now];
     banner(now, ago);
   }
 
   function banner(now, ago) {
-    const { run, link } = app, box = find("banner");
-    const killed = now === "replay" && !link.ended && !link.goes_on && run.began ? "killed" : "", broken = link.why ? "lost" : "";
-    const tone = broken || (killed || link.goes_on ? "stale" : now === "stale" || now === "lost" ? now : link.damaged ? "stale" : "");
+    const { run, link } = app,
+      box = find("banner");
+    const killed = now === "replay" && !link.ended && !link.goes_on && run.began ? "killed" : "",
+      broken = link.why ? "lost" : "";
+    const tone =
+      broken ||
+      (killed || link.goes_on ? "stale" : now === "stale" || now === "lost" ? now : link.damaged ? "stale" : "");
     if (box.dataset.k !== tone + now) {
       box.dataset.k = tone + now;
       box.className = tone;
-      box.replaceChildren(...(tone ? [el("span", { class: "num" })] : []), ...(now === "lost" ? [el("button", { text: "Try now", onclick: () => link.open() })] : []));
+      box.replaceChildren(
+        ...(tone ? [el("span", { class: "num" })] : []),
+        ...(now === "lost" ? [el("button", { text: "Try now", onclick: () => link.open() })] : []),
+      );
     }
     if (!tone) return;
-    const last = `As of ${clock(run.clock)}`, next = Math.max(0, Math.ceil((link.next - performance.now()) / 1000));
-    const hurt = link.damaged ? ` ${link.damaged} of its records ${link.damaged === 1 ? "is" : "are"} damaged: something may be missing.` : "";
-    const words = broken ? `The recording cannot be read: ${link.why}`
-      : link.goes_on ? `Written while the run went on, at ${clock(run.clock)}.${hurt}`
-      : killed ? `The recording ends at ${clock(run.clock)}: its process was killed, and what ran then may still run.${hurt}`
-        : hurt && !["stale", "lost"].includes(now) ? `The recording:${hurt}`
-        : now === "lost" ? `${last}; ${next ? `next try in ${next} s` : "trying"}. What is missed is filled in.`
-          : link.tick > 2 ? `${last}: the tick of the tree lasts for ${Math.floor(link.tick + ago)} s.` : `${last}: nothing has come since, not even a heartbeat.`;
+    const last = `As of ${clock(run.clock)}`,
+      next = Math.max(0, Math.ceil((link.next - performance.now()) / 1000));
+    const hurt = link.damaged
+      ? ` ${link.damaged} of its records ${link.damaged === 1 ? "is" : "are"} damaged: something may be missing.`
+      : "";
+    const words = broken
+      ? `The recording cannot be read: ${link.why}`
+      : link.goes_on
+        ? `Written while the run went on, at ${clock(run.clock)}.${hurt}`
+        : killed
+          ? `The recording ends at ${clock(run.clock)}: its process was killed, and what ran then may still run.${hurt}`
+          : hurt && !["stale", "lost"].includes(now)
+            ? `The recording:${hurt}`
+            : now === "lost"
+              ? `${last}; ${next ? `next try in ${next} s` : "trying"}. What is missed is filled in.`
+              : link.tick > 2
+                ? `${last}: the tick of the tree lasts for ${Math.floor(link.tick + ago)} s.`
+                : `${last}: nothing has come since, not even a heartbeat.`;
     text(box.firstChild, words);
     box.title = words;
   }

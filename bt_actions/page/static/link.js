@@ -3,21 +3,41 @@
 // `conn`: "live", "stale" (the stream is there, the run's heartbeat is not), "lost" (no stream), "replay" (the run is
 // over, or its process is gone). No time is made up: `head` goes on for at most AHEAD seconds behind a sign of life.
 
-const STALE = 2.5, AHEAD = 1.2, LONGEST = 15;
+const STALE = 2.5,
+  AHEAD = 1.2,
+  LONGEST = 15;
 
 export class Link {
   constructor(run, told) {
-    Object.assign(this, { run, told, conn: "lost", silence: 0, ended: false, tick: 0, damaged: 0, why: "", head: 0, signed: performance.now(), last_beat: null, tries: 0, next: 0, retry: 0 });
+    Object.assign(this, {
+      run,
+      told,
+      conn: "lost",
+      silence: 0,
+      ended: false,
+      tick: 0,
+      damaged: 0,
+      why: "",
+      head: 0,
+      signed: performance.now(),
+      last_beat: null,
+      tries: 0,
+      next: 0,
+      retry: 0,
+    });
     this.open();
   }
 
   open() {
     clearTimeout(this.retry);
     this.next = 0;
-    const { run } = this, source = this.source = new EventSource(`/run/${encodeURIComponent(run.key)}/events?after=${encodeURIComponent(`${run.key}:${run.number}`)}`);
+    const { run } = this,
+      source = (this.source = new EventSource(
+        `/run/${encodeURIComponent(run.key)}/events?after=${encodeURIComponent(`${run.key}:${run.number}`)}`,
+      ));
     source.addEventListener("events", ({ data }) => {
       this.tries = 0;
-      if (!run.take(JSON.parse(data))) return this.reset();    // never shown with a gap
+      if (!run.take(JSON.parse(data))) return this.reset(); // never shown with a gap
       this.sign(run.clock);
     });
     source.addEventListener("beat", ({ data }) => {
@@ -40,7 +60,12 @@ export class Link {
       this.set("replay");
     });
     source.addEventListener("reset", () => this.told("reset"));
-    source.addEventListener("broken", ({ data }) => { this.why = JSON.parse(data).why; run.over = true; this.close(); this.set("replay"); });
+    source.addEventListener("broken", ({ data }) => {
+      this.why = JSON.parse(data).why;
+      run.over = true;
+      this.close();
+      this.set("replay");
+    });
     source.onerror = () => {
       this.close();
       this.is_open = false;
@@ -53,8 +78,14 @@ export class Link {
     };
   }
 
-  reset() { this.close(); this.told("reset"); }
-  close() { clearTimeout(this.retry); this.source?.close(); }
+  reset() {
+    this.close();
+    this.told("reset");
+  }
+  close() {
+    clearTimeout(this.retry);
+    this.source?.close();
+  }
 
   // Something of the run was seen: its clock stood at t then.
   sign(t) {
@@ -68,10 +99,19 @@ export class Link {
   // Once a frame.
   look() {
     const { run } = this;
-    if (run.over) { this.head = run.clock; return; }
+    if (run.over) {
+      this.head = run.clock;
+      return;
+    }
     this.silence = (performance.now() - this.signed) / 1000;
-    if (this.base !== undefined) this.head = Math.max(this.head, run.clock, this.base + Math.min(AHEAD, this.is_open ? this.silence : 0));
+    if (this.base !== undefined)
+      this.head = Math.max(this.head, run.clock, this.base + Math.min(AHEAD, this.is_open ? this.silence : 0));
     this.set(!this.is_open ? "lost" : this.silence > STALE ? "stale" : "live");
   }
-  set(conn) { if (this.conn !== conn) { this.conn = conn; this.told("conn"); } }
+  set(conn) {
+    if (this.conn !== conn) {
+      this.conn = conn;
+      this.told("conn");
+    }
+  }
 }

@@ -18,8 +18,9 @@ import { create_log } from "./log.js";
 import { show_none } from "./other.js";
 import { toast, dress, splitters } from "./dress.js";
 import { listen } from "./keys.js";
+import { ways } from "./ways.js";
 
-const wide = matchMedia("(min-width: 1680px)"), narrow = matchMedia("(max-width: 700px)");
+const wide = matchMedia("(min-width: 1680px)"), narrow = matchMedia("(max-width: 700px), (max-height: 560px)");    // as in style.css
 const find = (id) => document.getElementById(id);
 const PAINT = 32;          // milliseconds between two paintings, at least
 const MORE = 300_000;     // events that come to a page before it begins anew with what is recorded by then, which is bounded
@@ -28,6 +29,7 @@ const app = {
   run: new Run(), link: null, s: null, t: 0, head: 0, at_head: true, playing: false, speed: 1, settled: false, grown: 0,
   sel: 0, pane: "tree", tab: "details", view: "outline", follow: true, squeeze: true, zoomed: null, folded: new Set(), narrow, more: MORE, first: 0,
   touch() { dirty = true; },
+  remember() { clearTimeout(writing); writing = setTimeout(() => history.replaceState(null, "", `#${params_now()}`), 250); },
   hidden(id) { return wide.matches ? false : narrow.matches ? app.pane !== id : app.tab !== id; },
   say(words) { find("said").textContent = words; toast(words); },
   select(n, { reveal = false, attempt } = {}) {
@@ -35,52 +37,19 @@ const app = {
     app.sel = n;
     panes.details.pick(n, attempt);
     if (reveal) { app.let_go(); if (app.view === "outline") panes.tree.show(n); else { app.open_above(n); panes.graph.show(n); } if (app.pane === "tree" && narrow.matches && document.activeElement?.closest("#why, #log, #values")) app.go_pane("tree"); }
-    remember();
+    app.remember();
     dirty = true;
   },
   seek(t, { snap = false } = {}) {
     if (snap || t >= app.head - 1e-4) return app.go_live();
     app.t = Math.max(0, t);
     app.at_head = false;
-    remember();
+    app.remember();
     dirty = true;
   },
-  go_live() { app.t = app.head; app.at_head = true; app.playing = false; panes.tree.rewind(); remember(); dirty = true; },
+  go_live() { app.t = app.head; app.at_head = true; app.playing = false; panes.tree.rewind(); app.remember(); dirty = true; },
   let_go() { if (app.follow) app.set_follow(false); },
   set_follow(on) { app.follow = on; find("follow").setAttribute("aria-pressed", on); },
-  refolded() { panes.tree.layout(); if (app.view === "graph") panes.graph.layout(); dirty = true; },
-  open_above(n) { let changed = false; for (let up = app.run.nodes[n].parent; up >= 0; up = app.run.nodes[up].parent) if (app.folded.delete(up)) changed = true; if (changed) app.refolded(); },
-  jump_running() { const list = app.run.leaves(app.s), at = list.indexOf(app.sel); if (list.length) app.select(list[(at + 1) % list.length], { reveal: true }); },
-  first_failure() { const { causes, stopped, passed } = app.run.failures(app.s), [one] = [...causes, ...stopped, ...passed]; if (one) app.select(one.n, { reveal: true }); },
-  fold_inactive() {
-    const { run, s } = app, kept = new Set();
-    const { causes, passed } = run.failures(s);
-    for (const n of [...s.running, ...[...causes, ...passed].map((one) => one.n)]) for (let up = n; up >= 0 && !kept.has(up); up = run.nodes[up].parent) kept.add(up);
-    app.folded = new Set(run.order.filter((node) => node.children.length && node.parent >= 0 && !kept.has(node.id)).map((node) => node.id));
-  },
-  go_view(view, tell = true) {
-    app.view = view;
-    find("outline").hidden = view !== "outline"; find("graph").hidden = view === "outline";
-    find("as-outline").setAttribute("aria-pressed", view === "outline"); find("as-graph").setAttribute("aria-pressed", view === "graph");
-    if (view === "graph") { if (tell && !app.folded.size && app.run.order.length > 100) app.fold_inactive(); app.open_above(app.sel); panes.graph.layout(); } else { panes.tree.layout(); panes.tree.show(app.sel); }
-    if (tell) remember();
-    dirty = true;
-  },
-  go_tab(tab, tell = true) {
-    app.tab = tab;
-    find("side").dataset.tab = tab;
-    for (const id of ["details", "values", "log"]) { find(`tab-${id}`).setAttribute("aria-selected", id === tab); find(`tab-${id}`).tabIndex = id === tab ? 0 : -1; }
-    if (tell) remember();
-    dirty = true;
-  },
-  go_pane(pane, tell = true) {
-    app.pane = pane;
-    document.body.dataset.pane = pane;
-    if (["details", "values", "log"].includes(pane)) app.go_tab(pane, false);
-    for (const button of document.querySelectorAll("#dock button")) button.setAttribute("aria-current", button.dataset.go === pane);
-    if (tell) remember();
-    dirty = true;
-  },
   async fetch_runs() { if (stored) return stored.map((one) => one.run); try { return (await (await fetch("/runs")).json()).runs; } catch { return []; } },
   open(id, params = new URLSearchParams()) {
     app.link?.close();
@@ -91,6 +60,7 @@ const app = {
 };
 let dirty = true, last = performance.now(), painted = 0;
 const panes = { head: create_head(app), strip: create_strip(app), tree: create_tree(app), graph: create_graph(app), timeline: create_timeline(app), details: create_details(app), values: create_values(app), log: create_log(app), transport: create_transport(app) };
+Object.assign(app, ways(app, panes));
 window.page = app;    // for tests, and for the curious
 
 // What the link tells: news, conn, reset, and settled when all that is recorded so far has come.
@@ -124,7 +94,7 @@ function settle() {
   panes.tree.layout();
   app.go_pane(app.pane, false); app.go_tab(app.tab, false); app.go_view(wanted.get("view") === "graph" ? "graph" : "outline", false);
   requestAnimationFrame(() => { panes.tree.show(app.sel, 4); dirty = true; });
-  remember();
+  app.remember();
 }
 
 // The clock. Where nothing comes from the run, nothing ticks: a page must not make up progress.
@@ -160,7 +130,6 @@ function params_now() {
   return params;
 }
 let writing = 0;
-function remember() { clearTimeout(writing); writing = setTimeout(() => history.replaceState(null, "", `#${params_now()}`), 250); }
 
 async function enter() {
   const params = new URLSearchParams(location.hash.slice(1));

@@ -7,23 +7,44 @@ import { State, leaves, upper } from "./state.js";
 import { view } from "./doing.js";
 import { TAKE } from "./taking.js";
 
-const LONG = 4;    // a gap of more seconds without a goal is drawn as so many
+const LONG = 4; // a gap of more seconds without a goal is drawn as so many
 
 export class Run {
   constructor(key = "") {
     Object.assign(this, {
-      key,                       // by which the server knows the run
-      info: { id: "", tree: "", inputs: {} }, files: {}, nodes: [], of_id: new Map(), order: [], servers: [], began: null,
-      events: [], number: 0, early: [], missing: [], over: false, clock: 0,
-      attempts: [], of_goal: new Map(), of_node: new Map(),
-      waits: [],                 // of leaves without a server: { n, from, to }
-      open_waits: new Map(), history: new Map(), lines: [], presence: new Map(),
-      steps: [],                 // times that are worth a stop: not feedback
-      snapshots: new Map(), state: new State(), grown: 0,
+      key, // by which the server knows the run
+      info: { id: "", tree: "", inputs: {} },
+      files: {},
+      nodes: [],
+      of_id: new Map(),
+      order: [],
+      servers: [],
+      began: null,
+      events: [],
+      number: 0,
+      early: [],
+      missing: [],
+      over: false,
+      clock: 0,
+      attempts: [],
+      decided: 0,
+      of_goal: new Map(),
+      of_node: new Map(),
+      waits: [], // of leaves without a server: { n, from, to }
+      open_waits: new Map(),
+      history: new Map(),
+      lines: [],
+      presence: new Map(),
+      steps: [], // times that are worth a stop: not feedback
+      snapshots: new Map(),
+      state: new State(),
+      grown: 0,
     });
   }
 
-  get every() { return Math.max(256, this.nodes.length); }    // events between two snapshots
+  get every() {
+    return Math.max(256, this.nodes.length);
+  } // events between two snapshots
 
   // A batch from the stream: numbers `from` to `to`. False where it does not follow what is here.
   take({ from, to, events }) {
@@ -34,7 +55,7 @@ export class Run {
   }
 
   push(e) {
-    if (e.kind !== "EventsLost") this.number = e.at[0];    // which has the number of what follows
+    if (e.kind !== "EventsLost") this.number = e.at[0]; // which has the number of what follows
     if (!this.began) {
       const began = e.kind === "RunBegan" ? e : e.events?.find((one) => one.kind === "RunBegan");
       if (!began) return void this.early.push(e);
@@ -58,12 +79,25 @@ export class Run {
     e.t = Math.max(0, e.at[1] - this.began[1]);
     if (typeof e.node === "number" && !this.nodes[this.of_id.get(e.node)]?.gone) e.n = this.of_id.get(e.node);
     if (e.kind === "NodesAdded") this.grow(e.nodes);
-    if (e.kind === "NodesRemoved") { e.slots = e.nodes.map((id) => this.of_id.get(id)).filter((n) => n !== undefined && !this.nodes[n].gone); this.shrink(e.slots); }
+    if (e.kind === "NodesRemoved") {
+      e.slots = e.nodes.map((id) => this.of_id.get(id)).filter((n) => n !== undefined && !this.nodes[n].gone);
+      this.shrink(e.slots);
+    }
     if (e.kind !== "StateKnown") return;
     e.events.forEach((inner) => this.resolve(inner));
-    const there = new Set(e.nodes), slot = (id) => this.of_id.get(id);
+    const there = new Set(e.nodes),
+      slot = (id) => this.of_id.get(id);
     this.shrink(this.nodes.filter((node) => !node.gone && !there.has(node.number)).map((node) => node.id));
-    const known = (all) => all.filter((one) => slot(one.node) !== undefined).map((one) => ({ n: slot(one.node), t: Math.max(0, one.at[1] - this.began[1]), number: one.at[0], message: one.message, by: slot(one.by) ?? null }));
+    const known = (all) =>
+      all
+        .filter((one) => slot(one.node) !== undefined)
+        .map((one) => ({
+          n: slot(one.node),
+          t: Math.max(0, one.at[1] - this.began[1]),
+          number: one.at[0],
+          message: one.message,
+          by: slot(one.by) ?? null,
+        }));
     e.pending = Object.entries(e.pending).map(([id, all]) => [slot(+id), known(all)]);
     e.dealt = known(e.dealt);
     e.visits = e.visits.map(([id, told, ended]) => [slot(id), told, ended]);
@@ -71,7 +105,15 @@ export class Run {
   }
 
   enter(e) {
-    Object.assign(this.info, { id: e.run_id, tree: e.tree, inputs: e.inputs, wall: e.at[2], versions: e.versions, where: e.where || {}, request: e.request });
+    Object.assign(this.info, {
+      id: e.run_id,
+      tree: e.tree,
+      inputs: e.inputs,
+      wall: e.at[2],
+      versions: e.versions,
+      where: e.where || {},
+      request: e.request,
+    });
     Object.assign(this.files, e.sources);
     this.grow(e.nodes);
   }
@@ -79,9 +121,27 @@ export class Run {
   grow(nodes) {
     for (const { id, parent, index, settings, place, action, ...rest } of nodes) {
       if (this.of_id.has(id)) continue;
-      const up = parent === null ? undefined : this.nodes[this.of_id.get(parent)], [, file, line, col] = /^(.*?)(?::(\d+))?(?::(\d+))?$/.exec(place);
-      const node = { ...rest, id: this.nodes.length, number: id, parent: up ? up.id : -1, depth: up ? up.depth + 1 : 0, children: [], ever: [], gone: false,
-        file, line: +line || 0, col: +col || 0, type: action, timeouts: settings.timeouts || null, retry: { attempts: settings.attempts || 1 }, expect: settings.expect, constants: settings.constants || {}, settings };
+      const up = parent === null ? undefined : this.nodes[this.of_id.get(parent)],
+        [, file, line, col] = /^(.*?)(?::(\d+))?(?::(\d+))?$/.exec(place);
+      const node = {
+        ...rest,
+        id: this.nodes.length,
+        number: id,
+        parent: up ? up.id : -1,
+        depth: up ? up.depth + 1 : 0,
+        children: [],
+        ever: [],
+        gone: false,
+        file,
+        line: +line || 0,
+        col: +col || 0,
+        type: action,
+        timeouts: settings.timeouts || null,
+        retry: { attempts: settings.attempts || 1 },
+        expect: settings.expect,
+        constants: settings.constants || {},
+        settings,
+      };
       node.words = `${node.name}\n${node.kind}\n${node.server}\n${node.type}\n${place}`.toLowerCase();
       this.of_id.set(id, node.id);
       this.nodes.push(node);
@@ -94,7 +154,8 @@ export class Run {
   }
   shrink(slots) {
     for (const n of slots) {
-      const node = this.nodes[n], up = this.nodes[node.parent];
+      const node = this.nodes[n],
+        up = this.nodes[node.parent];
       node.gone = true;
       if (up) up.children.splice(up.children.indexOf(node), 1);
     }
@@ -104,8 +165,14 @@ export class Run {
   arrange() {
     this.order = [];
     const waiting = this.nodes.length ? [this.nodes[0]] : [];
-    while (waiting.length) { const node = waiting.pop(); node.place_in_tree = this.order.length; this.order.push(node); for (let k = node.children.length; k--;) waiting.push(node.children[k]); }
-    for (let k = this.order.length; k--;) this.order[k].below = this.order[k].children.reduce((sum, kid) => sum + kid.below + 1, 0);
+    while (waiting.length) {
+      const node = waiting.pop();
+      node.place_in_tree = this.order.length;
+      this.order.push(node);
+      for (let k = node.children.length; k--;) waiting.push(node.children[k]);
+    }
+    for (let k = this.order.length; k--;)
+      this.order[k].below = this.order[k].children.reduce((sum, kid) => sum + kid.below + 1, 0);
     this.servers = [...new Set(this.nodes.map((node) => node.server).filter(Boolean))].sort();
     this.grown++;
   }
@@ -132,17 +199,27 @@ export class Run {
     }
     return s;
   }
-  index_at(t) { return upper(this.events, t, (e) => e.t); }
+  index_at(t) {
+    return upper(this.events, t, (e) => e.t);
+  }
   // The attempts of one visit of a node, as far as they had begun at t: of the latest, or of that of `like`.
   attempts_of(n, t, like) {
-    const all = (this.of_node.get(n) || []).filter((a) => a.start <= t), visit = like && like.start <= t ? like.visit : all.at(-1)?.visit;
+    const all = (this.of_node.get(n) || []).filter((a) => a.start <= t),
+      visit = like && like.start <= t ? like.visit : all.at(-1)?.visit;
     return all.filter((a) => a.visit === visit);
   }
-  gap_at(t) { return this.missing.find((gap) => gap.from < t && t < gap.to); }
-  view(n, s) { return view(this, n, s); }
+  gap_at(t) {
+    return this.missing.find((gap) => gap.from < t && t < gap.to);
+  }
+  view(n, s) {
+    return view(this, n, s);
+  }
 
   leaves(s) {
-    if (s.leaves_at !== s.i) { s.leaves_at = s.i; s.leaves = leaves(s, this.nodes); }
+    if (s.leaves_at !== s.i) {
+      s.leaves_at = s.i;
+      s.leaves = leaves(s, this.nodes);
+    }
     return s.leaves;
   }
 
@@ -154,7 +231,11 @@ export class Run {
     const root = s.status[0] === "failure" ? s.pending.get(0) || [] : [];
     const stopped = s.finished?.status === "INVALID" ? s.stopped : [];
     const open = root.length ? [] : [...s.pending.values()].flat();
-    s.failures = { causes: [...root].sort((a, b) => this.nodes[a.n].place_in_tree - this.nodes[b.n].place_in_tree), stopped, passed: [...s.dealt, ...open].sort((a, b) => a.number - b.number) };
+    s.failures = {
+      causes: [...root].sort((a, b) => this.nodes[a.n].place_in_tree - this.nodes[b.n].place_in_tree),
+      stopped,
+      passed: [...s.dealt, ...open].sort((a, b) => a.number - b.number),
+    };
     return s.failures;
   }
 
@@ -175,12 +256,31 @@ export class Run {
     const gaps = [];
     if (squeeze) {
       let until = 0;
-      const gap = (from, to) => { if (to - from > LONG) gaps.push({ from: from + LONG / 2, to: to - LONG / 2 }); };
-      for (const a of this.attempts) { gap(until, a.start); until = Math.max(until, Math.min(a.done, head)); }
+      const gap = (from, to) => {
+        if (to - from > LONG) gaps.push({ from: from + LONG / 2, to: to - LONG / 2 });
+      };
+      for (const a of this.attempts) {
+        gap(until, a.start);
+        until = Math.max(until, Math.min(a.done, head));
+      }
       gap(until, head);
     }
-    const to = (t) => { let x = t; for (const g of gaps) { if (t <= g.from) break; x -= Math.min(t, g.to) - g.from; } return x; };
-    const back = (x) => { let t = x; for (const g of gaps) { if (t <= g.from) break; t += g.to - g.from; } return t; };
+    // What is left out before the end of each gap.
+    let out = 0;
+    for (const gap of gaps) {
+      gap.at = gap.from - out;
+      out += gap.to - gap.from;
+      gap.out = out;
+    }
+    const before = (value, key) => gaps[upper(gaps, value, key) - 1];
+    const to = (t) => {
+      const gap = before(t, (one) => one.from);
+      return !gap ? t : t < gap.to ? gap.at : t - gap.out;
+    };
+    const back = (x) => {
+      const gap = before(x, (one) => one.at);
+      return !gap || x <= gap.at ? x + (gap ? gap.out - (gap.to - gap.from) : 0) : x + gap.out;
+    };
     return { to, back, gaps };
   }
 }

@@ -5,7 +5,7 @@ export const el = (name, attributes = {}, ...kids) => {
   for (const [key, value] of Object.entries(attributes)) {
     if (value === undefined || value === null || value === false) continue;
     if (key === "text") made.textContent = value;
-    else if (key === "style") made.style.cssText = value;    // which the page's policy allows, unlike the attribute
+    else if (key === "style") made.style.cssText = value; // which the page's policy allows, unlike the attribute
     else if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
     else made.setAttribute(key, value === true ? "" : value);
   }

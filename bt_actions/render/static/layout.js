@@ -4,10 +4,12 @@
 
 import { label, look } from "./looks.js";
 
-export const NAME = 13;       // font sizes
+export const NAME = 13; // font sizes
 export const UNDER = 10.5;
-export const LINE = 1.25;     // line height
-const BETWEEN = 14, LEVELS = 42, MARGIN = 40;         // gaps between nodes, between levels, around all
+export const LINE = 1.25; // line height
+const BETWEEN = 14,
+  LEVELS = 42,
+  MARGIN = 40; // gaps between nodes, between levels, around all
 
 // What is shown of nodes that stand in reading order, a parent before its children.
 export function visible(nodes, is_open) {
@@ -35,15 +37,23 @@ function measure(node) {
   node.text_h = h;
   node.w = w + 24;
   node.h = h + 12;
-  if (node.shape === "ellipse") { node.w = w * 1.16 + 28; node.h = h * 1.3 + 10; }
-  if (node.shape === "parallelogram") { node.slant = node.h * 0.6; node.w = w + 30 + node.slant; }
+  if (node.shape === "ellipse") {
+    node.w = w * 1.16 + 28;
+    node.h = h * 1.3 + 10;
+  }
+  if (node.shape === "parallelogram") {
+    node.slant = node.h * 0.6;
+    node.w = w + 30 + node.slant;
+  }
 }
 
 // A node stands in the middle of the room that its children need side by side, but no farther than about half a screen
 // from the first of them: a large tree begins where its root is. Returns the width and height of all.
 export function lay_out(shown, { down, is_open }) {
-  const across = down ? (node) => node.w : (node) => node.h, along = down ? (node) => node.h : (node) => node.w;
-  const near = down ? 700 : 300, levels = [];
+  const across = down ? (node) => node.w : (node) => node.h,
+    along = down ? (node) => node.h : (node) => node.w;
+  const near = down ? 700 : 300,
+    levels = [];
   for (const node of shown) {
     measure(node);
     levels[node.depth] = Math.max(levels[node.depth] || 0, along(node));
@@ -57,12 +67,18 @@ export function lay_out(shown, { down, is_open }) {
   levels.forEach((size, depth) => starts.push(starts[depth] + size + LEVELS));
   for (const node of shown) {
     if (node.parent < 0) node.from = MARGIN;
-    const middle = node.from + Math.min(node.room / 2, near), level = starts[node.depth] + levels[node.depth] / 2;
+    const middle = node.from + Math.min(node.room / 2, near),
+      level = starts[node.depth] + levels[node.depth] / 2;
     [node.x, node.y] = down ? [middle, level] : [starts[node.depth] + node.w / 2, middle];
     let from = node.from + (node.room - node.inner) / 2;
-    if (node.inner) for (const child of node.children) { child.from = from; from += child.room; }
+    if (node.inner)
+      for (const child of node.children) {
+        child.from = from;
+        from += child.room;
+      }
   }
-  const length = starts[levels.length] - LEVELS + MARGIN, breadth = shown[0].room + 2 * MARGIN;
+  const length = starts[levels.length] - LEVELS + MARGIN,
+    breadth = shown[0].room + 2 * MARGIN;
   return down ? [breadth, length] : [length, breadth];
 }
 
@@ -70,20 +86,40 @@ export function lay_out(shown, { down, is_open }) {
 
 export function edge(parent, child, down) {
   if (down) {
-    const from = parent.y + parent.h / 2 + 8, to = child.y - child.h / 2, mid = (from + to) / 2;
+    const from = parent.y + parent.h / 2 + 8,
+      to = child.y - child.h / 2,
+      mid = (from + to) / 2;
     return `M${parent.x} ${from}C${parent.x} ${mid} ${child.x} ${mid} ${child.x} ${to}`;
   }
-  const from = parent.x + (parent.w - parent.slant) / 2, to = child.x - child.w / 2, bend = to - LEVELS / 2;
+  const from = parent.x + (parent.w - parent.slant) / 2,
+    to = child.x - child.w / 2,
+    bend = to - LEVELS / 2;
   return `M${from} ${parent.y}H${to - LEVELS / 1.5}C${bend} ${parent.y} ${bend} ${child.y} ${to} ${child.y}h${child.slant / 2}`;
 }
 
 export function outline(node) {
-  const a = node.w / 2, b = node.h / 2;
+  const a = node.w / 2,
+    b = node.h / 2;
   if (node.shape === "ellipse") return ["ellipse", { rx: a, ry: b }];
   if (node.shape === "box") return ["rect", { x: -a, y: -b, width: 2 * a, height: 2 * b }];
   const cut = node.shape === "octagon" ? b * 0.58 : node.slant;
-  const corners = node.shape === "octagon"
-    ? [[-a, b - cut], [-a, cut - b], [cut - a, -b], [a - cut, -b], [a, cut - b], [a, b - cut], [a - cut, b], [cut - a, b]]
-    : [[cut - a, -b], [a, -b], [a - cut, b], [-a, b]];
+  const corners =
+    node.shape === "octagon"
+      ? [
+          [-a, b - cut],
+          [-a, cut - b],
+          [cut - a, -b],
+          [a - cut, -b],
+          [a, cut - b],
+          [a, b - cut],
+          [a - cut, b],
+          [cut - a, b],
+        ]
+      : [
+          [cut - a, -b],
+          [a, -b],
+          [a - cut, b],
+          [-a, b],
+        ];
   return ["polygon", { points: corners.join(" ") }];
 }

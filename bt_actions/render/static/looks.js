@@ -1,6 +1,7 @@
-// What a node of a tree looks like, in every picture and page: look.py reads this table, for Graphviz's pictures, and
+// What a node of a tree looks like, in every picture and page: look.py reads this table as JSON, for Graphviz's pictures, and
 // says the same of a node. Shapes are py_trees' own.
 
+// oxfmt-ignore
 export const TABLE = {
   "letters": 28,
   "looks": {
@@ -15,7 +16,13 @@ export const TABLE = {
 
 export function look(node) {
   const word = node.kind.replace(/^reactive /, "").split(",")[0];
-  const name = node.server ? "action" : ["sequence", "fallback", "parallel"].includes(word) ? word : node.children.length ? "decorator" : "leaf";
+  const name = node.server
+    ? "action"
+    : ["sequence", "fallback", "parallel"].includes(word)
+      ? word
+      : node.children.length
+        ? "decorator"
+        : "leaf";
   return { name, ...TABLE.looks[name] };
 }
 
@@ -24,8 +31,10 @@ export function label(node) {
   const lines = [""];
   for (const word of node.name.split(/\s+/).filter(Boolean)) {
     for (let at = 0; at < word.length; at += TABLE.letters) {
-      const part = word.slice(at, at + TABLE.letters), line = `${lines.at(-1)} ${part}`.trim();
-      if (line.length > TABLE.letters || at) lines.push(part); else lines[lines.length - 1] = line;
+      const part = word.slice(at, at + TABLE.letters),
+        line = `${lines.at(-1)} ${part}`.trim();
+      if (line.length > TABLE.letters || at) lines.push(part);
+      else lines[lines.length - 1] = line;
     }
   }
   return { lines, under: node.server ? [node.server, node.type].filter(Boolean) : [node.kind] };

@@ -1,0 +1,141 @@
+"""The page for every reader: without barriers, by keyboard alone, small, enlarged, in colours that
+a system forces, and without motion."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import Any
+
+import pytest
+
+from tests.page.conftest import Page
+from tests.support import browser as chromium
+
+pytestmark = [
+    pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing() or "-"),
+    pytest.mark.ros,
+]
+PANES = ["tab=details", "tab=values", "tab=log&t=2.0", "view=graph", "pane=time", "pane=log"]
+BARRIERS = """
+axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"] })
+  .then((found) => { window.barriers = found.violations
+    .flatMap(({ id, nodes }) => nodes.map((one) => `${id}: ${one.html.slice(0, 200)}`)); });
+"""  # noqa: E501
+FOCUS = "return document.activeElement.getAttribute('aria-label') || document.activeElement.id"
+
+
+def barriers(window: chromium.Browser) -> Any:
+    """What axe-core finds on the page as it is now."""
+    window.cdp("Runtime.evaluate", expression=_axe())
+    window.run(f"window.barriers = null; {BARRIERS}")
+    return window.wait_for("window.barriers && JSON.stringify(window.barriers)")
+
+
+def _axe() -> str:
+    package = pytest.importorskip("axe_playwright_python", exc_type=ImportError).__name__
+    return files(package).joinpath("axe.min.js").read_text("utf-8")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1920, 1440, 390])
+def test_there_are_no_barriers_on_any_pane(over: Page, scheme: str, width: int) -> None:
+    over.window.scheme(scheme)
+    for pane in PANES:
+        assert barriers(over.open(f"#{pane}", width=width)) == "[]"
+
+
+def test_there_are_no_barriers_in_help_and_in_the_choice_of_runs(over: Page) -> None:
+    window = over.open()
+    for opener, opened in (("help-open", "#help"), ("switch", "#runs .opt")):
+        window.run(f"document.getElementById('{opener}').click()")
+        window.wait_for(f"document.querySelector('{opened}')?.checkVisibility()")
+        assert barriers(window) == "[]"
+        window.keys("Escape")
+
+
+def test_the_tree_is_walked_folded_and_searched_by_keys_alone(over: Page) -> None:
+    window = over.open()
+    window.run("document.querySelector('.row[aria-selected=true]').focus()")
+    assert window.run(FOCUS).startswith("Home, MoveRobot, ABORTED")
+    window.keys("Left")  # to the parent
+    assert window.wait_for(f"(() => {{ {FOCUS} }})().startsWith('Home in time')")
+    window.keys("Left")  # folds it
+    folded = "document.activeElement.getAttribute('aria-expanded')"
+    assert window.wait_for(f"{folded} === 'false'")
+    window.keys("Right")
+    assert window.wait_for(f"{folded} === 'true'")
+    window.keys("Home")
+    assert window.wait_for(f"(() => {{ {FOCUS} }})().startsWith('Shift, sequence')")
+    window.keys("End", "Up", "Down", "Enter")
+    window.keys("/")
+    assert window.run(FOCUS) == "Find a node"
+    window.keys(*"grasp", "Enter")
+    assert over.text("#details h2", "Grasp")
+    assert window.run("return document.getElementById('found').textContent") == "1 of 1"
+
+
+def test_all_that_can_be_pressed_is_reached_by_tab_and_seen_to_be(over: Page) -> None:
+    window = over.open()
+    window.run("document.querySelector('.skip').focus()")
+    reached = []
+    for _ in range(60):
+        window.keys("Tab")
+        reached.append(window.run("return document.activeElement.id"))
+        ring = "const { outlineStyle, backgroundColor } = getComputedStyle(document.activeElement);"
+        ring += "return document.activeElement === document.body || outlineStyle !== 'none'"
+        assert window.run(f"{ring} || document.activeElement.matches('.split')"), reached[-1]
+        if reached[-1] == "lanes":
+            break
+    wanted = ["switch", "conn", "query", "details", "split-side", "tab-details", "split-time"]
+    assert set(wanted) <= set(reached)
+    assert [each for each in reached if each.startswith("row-")] != []
+    before = window.run("return page.t")
+    window.keys("Left")
+    assert window.wait_for("page.t < arguments[0]", before)
+
+
+def test_a_splitter_is_moved_by_keys_and_says_where_it_is(over: Page) -> None:
+    window = over.open()
+    now = "+document.getElementById('split-side').getAttribute('aria-valuenow')"
+    wide = window.run("document.getElementById('split-side').focus(); return side.offsetWidth")
+    assert window.run(f"return {now}") == wide
+    window.keys("Left")
+    assert window.wait_for(f"side.offsetWidth === {wide} + 24 && {now} === {wide} + 24")
+
+
+@pytest.mark.parametrize("pane", ["tree", "time", "details", "values", "log"])
+def test_at_200_percent_each_pane_has_the_window(over: Page, pane: str) -> None:
+    window = over.window
+    window.open("about:blank")
+    window.open(f"{over.place}#pane={pane}", width=720, height=450)  # half of 1440 by 900
+    assert window.wait_for("window.page?.settled")
+    assert window.run("return document.documentElement.scrollWidth") <= 720
+    height = window.run(f"return document.getElementById('{pane}').clientHeight")
+    assert height > 200
+    assert window.run("return document.getElementById('dock').checkVisibility()")
+
+
+def test_forced_colours_show_what_is_chosen_and_how_nodes_stand(over: Page) -> None:
+    features = [{"name": "forced-colors", "value": "active"}]
+    over.window.cdp("Emulation.setEmulatedMedia", features=features)
+    try:
+        window = over.open("#t=4.0")
+        colour = (
+            "const colour = (id) => getComputedStyle(document.getElementById(id)).backgroundColor;"
+        )
+        assert window.run(f"{colour} return colour('as-outline') !== colour('as-graph')")
+        assert window.run(f"{colour} return colour('tab-details') !== colour('tab-log')")
+        row = "getComputedStyle(document.querySelector('.row[aria-selected=true]'))"
+        assert window.run(f"return {row}.outlineStyle") == "solid"
+        phases = "[...document.querySelectorAll('.ph-exec')]"
+        assert window.run(
+            f"return new Set({phases}.map((one) => getComputedStyle(one).backgroundColor)).size > 1"
+        )
+    finally:
+        over.window.cdp("Emulation.setEmulatedMedia", features=[])
+
+
+def test_nothing_moves_by_itself_where_nothing_comes(over: Page) -> None:
+    window = over.open("#t=4.0")
+    assert window.run("return document.querySelectorAll('.st-running').length") > 2
+    assert window.run("return document.getAnimations().length") == 0
