@@ -23,11 +23,12 @@ def page(found: Sequence[Report]) -> str:
     """
     texts = static_files()
     modules = {name[:-3]: text for name, text in texts.items() if name.endswith(".js")}
-    code, style = script("main", modules), texts["style.css"]
+    code, style = script("main", modules), texts["drawing.css"] + texts["style.css"]
     data = data_text([_run(each) for each in found])
     within = {
         '<meta charset="utf-8">': '<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy(code, style)}">',
+        '<link rel="stylesheet" href="drawing.css">\n': "",
         '<link rel="stylesheet" href="style.css">': f"<style>{style}</style>",
         '<script type="module" src="main.js"></script>\n': "",
         "</body>": f'<script type="application/json" id="stored">{data}</script>\n'

@@ -56,7 +56,8 @@ def page(
         raise RenderError(
             f"a page of {len(nodes):,} nodes would be too slow; write .svg or .txt, with --depth"
         )
-    style, code = _file("page.css"), script("page", _modules())
+    style = (STATIC / "drawing.css").read_text("utf-8") + _file("page.css")
+    code = script("page", _modules())
     parts = {
         "policy": policy(code, style),
         "title": html.escape(clean(nodes[0].name)),
@@ -110,9 +111,8 @@ def _data(
 
 
 def _modules() -> dict[str, str]:
-    return {
-        path.stem: path.read_text("utf-8") for path in [*STATIC.iterdir(), *_FOLDER.glob("*.js")]
-    }
+    paths = (*STATIC.glob("*.js"), *_FOLDER.glob("*.js"))
+    return {path.stem: path.read_text("utf-8") for path in paths}
 
 
 def _file(name: str) -> str:
