@@ -4,11 +4,15 @@ a system forces, and without motion."""
 from __future__ import annotations
 
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.page.conftest import Page
+from bt_actions import load_tree, render
+from bt_actions.document.cards import cards_of
+from bt_actions.document.describing import nodes_of
+from tests.page.conftest import ROOT, Page
 from tests.support import browser as chromium
 
 pytestmark = [
@@ -51,6 +55,21 @@ def test_there_are_no_barriers_in_help_and_in_the_choice_of_runs(over: Page) -> 
         window.wait_for(f"document.querySelector('{opened}')?.checkVisibility()")
         assert barriers(window) == "[]"
         window.keys("Escape")
+
+
+def test_there_are_no_barriers_in_a_tree_that_is_drawn(
+    window: chromium.Browser, tmp_path: Path
+) -> None:
+    path = tmp_path / "tree.html"
+    root = load_tree(ROOT / "trees" / "pick_and_place.yaml")
+    render.write(nodes_of(root), path, cards=cards_of(root))
+    window.open(path, width=1440)
+    window.keys("Tab")
+    assert barriers(window) == "[]"
+    click = "dispatchEvent(new Event('click', { bubbles: true }))"
+    window.run(f"document.querySelector('.node').{click}")
+    assert window.wait_for("!document.getElementById('card').hidden")
+    assert barriers(window) == "[]"
 
 
 def test_the_tree_is_walked_folded_and_searched_by_keys_alone(over: Page) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import random
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -54,12 +53,6 @@ return counts.map((count) => {
 });
 """  # noqa: E501
 """What the page's store says behind so many events, for each of some counts."""
-
-
-@pytest.fixture(scope="module")
-def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
-    with chromium.browser(tmp_path_factory.mktemp("browser")) as opened:
-        yield opened
 
 
 def told(events: list[Event], count: int) -> dict[str, Any]:
@@ -208,3 +201,28 @@ def in_page(
     found = window.run(TELL, json.dumps(events), counts)
     assert isinstance(found, list)
     return found
+
+
+CUT = """
+const [text, cuts] = arguments, all = () => JSON.parse(text), last = all().at(-1).at[0];
+const state = (run, count) => { const { leaves_at, ...s } = run.go(count); return JSON.stringify({ ...s, status: [...s.status], pending: [...s.pending], due: [...s.due], round: [...s.round], backoff: [...s.backoff], vars: [...s.vars], running: [...s.running] }); };
+const whole = new window.Store.Run("x");
+whole.take({ from: 1, to: last, events: all() });
+return cuts.filter((cut) => {
+  const run = new window.Store.Run("x"), events = all(), again = Math.max(0, cut - 3);
+  run.take({ from: 1, to: events[cut].at[0], events: events.slice(0, cut + 1) });
+  run.go(cut);
+  run.take({ from: events[again].at[0], to: last, events: all().slice(again) });
+  return state(run, events.length) !== state(whole, events.length) || state(run, cut) !== state(whole, cut);
+});
+"""  # noqa: E501
+"""Those cuts after which a stream that is resumed, with some events twice, gives another state."""
+
+
+def test_a_stream_that_is_cut_and_resumed_gives_the_same_state(
+    served: Served, window: chromium.Browser
+) -> None:
+    events = [to_plain(each) for each in any_run(7, 400)]
+    in_page(served, window, events, [0])
+    cuts = [at for at in range(1, len(events) - 1) if events[at]["kind"] != "EventsLost"][::9]
+    assert window.run(CUT, json.dumps(events), cuts) == []
