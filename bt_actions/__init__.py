@@ -13,6 +13,8 @@ _open_closed_streams()  # before py_trees is imported, which asks for sys.stdout
 
 if _TYPE_CHECKING:
     from bt_actions.behaviours.action import ActionBehaviour, Progress
+    from bt_actions.behaviours.composites import InTurn, Pipeline, Recover
+    from bt_actions.behaviours.decorators import Every
     from bt_actions.behaviours.robot import Gripper, MoveRobot
     from bt_actions.behaviours.run_tree import RunTree
     from bt_actions.behaviours.variables import Var
@@ -30,6 +32,11 @@ __all__ = [  # noqa: RUF022 - grouped by use
     "Gripper",
     "RunTree",
     "Var",
+    # composites, and what holds a child back
+    "Recover",
+    "Pipeline",
+    "Every",
+    "InTurn",
     # policies
     "Timeouts",
     "Retry",
@@ -48,6 +55,8 @@ __all__ = [  # noqa: RUF022 - grouped by use
 
 _PLACES = {
     "behaviours.action": ["ActionBehaviour", "Progress"],
+    "behaviours.composites": ["InTurn", "Pipeline", "Recover"],
+    "behaviours.decorators": ["Every"],
     "behaviours.robot": ["Gripper", "MoveRobot"],
     "behaviours.run_tree": ["RunTree"],
     "behaviours.variables": ["Var"],

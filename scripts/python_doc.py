@@ -60,6 +60,7 @@ What holds everywhere:
 """
 GROUPS = {
     "Leaves": ["ActionBehaviour", "MoveRobot", "Gripper", "RunTree", "Var"],
+    "Composites": ["Recover", "Pipeline", "Every", "InTurn"],
     "Policies": ["Timeouts", "Retry", "Busy"],
     "What became of a goal": ["Outcome", "End", "AttemptRecord", "Progress"],
     "Running": ["load_tree", "TreeRunner", "TreeError", "GoalReport"],
@@ -92,6 +93,12 @@ TESTING_HEAD = """\
 From `bt_actions.testing`; how they are used stands in [testing.md](testing.md)."""
 BY_PY_TREES = {"setup", "initialise", "update", "terminate", "shutdown"}
 BY_OURSELVES = {
+    "Every.due_in",
+    "Every.gate",
+    "InTurn.work",
+    "Pipeline.work",
+    "Recover.due_in",
+    "Recover.work",
     "ActionBehaviour.due_in",
     "ActionBehaviour.open_handles",
     "Retry.pause",

@@ -17,8 +17,9 @@ from pathlib import Path
 from bt_actions.document.findings.rules import RULES
 from bt_actions.document.kinds import KINDS
 from bt_actions.document.language.keys import (
-    ACTION_KEYS,
     ALIAS,
+    DOING,
+    GATES,
     INPUT,
     OUTPUT,
     RETRY,
@@ -165,6 +166,22 @@ process:
 | | |
 |---|---|
 """
+ON_CHANGE = """\
+While the goal executes, its fields are computed anew at each tick. Where they differ from what was
+sent (`now` apart):
+
+| | |
+|---|---|
+| `ignore` | nothing is done |
+| `replace` | the new goal is sent at once; the old one is canceled after `timeout.cancel` |
+| `cancel` | the goal is canceled, and the new one is sent when that has ended |
+
+The node stays RUNNING, and the end of the newest goal alone counts. `timeout.result` runs on, and
+no attempt is used. A goal that cannot be built is not sent, and the old one runs on; one that is
+refused ends the attempt, and the old goal is canceled. Changes while a goal is being sent, or while
+a replaced one has to end, wait, and the newest counts: two goals live at once at most. On a
+`subtree`, `on_change: pass` hands changed inputs on.
+"""
 QOS = """\
 ### `qos`
 
@@ -191,7 +208,28 @@ node's own, the action's under `actions`, the tree's `defaults`, those that it i
 NAMESPACE = """\
 Names of actions, services and topics are relative where they begin without a slash. Before one go
 the namespaces of the node, of the trees and subtrees around it, and its own."""
-SHOWN = {"if": "recovering"}
+LEFT_OUT = """\
+Both may stand beside any kind. A node is left out where `only_if` is false as it begins, where
+`only_while` is false before a tick (what runs below is stopped, and the node is `RUNNING` until the
+goals of that have ended), and where all of its children were left out. Its parent goes on as if the
+node were not there:
+
+| parent | does |
+|---|---|
+| `sequence`, `pipeline`, `fallback` | goes on to the next child |
+| `parallel` | asks again at each tick; meanwhile the node counts for `all`, not for `at_least` |
+| `repeat` without `times` | stays RUNNING, and asks at the next tick |
+| `for_each` | goes on to the next item; this one has neither succeeded nor failed |
+| any other decorator, `if`, `subtree` | is left out with it |
+| `recover` of a `retry` | the retry fails |
+| the root | SUCCESS |
+
+A gate waits as a `check` does while the first message of a topic may come. Afterwards a condition
+that cannot be computed fails the node: `known($door)` asks for a value. py_trees has no status for
+a node that is left out: it is SUCCESS below a sequence, FAILURE below a fallback, and its message
+says so (`left out: $near is false`).
+"""
+SHOWN = {"if": "recovering", "pipeline": "following"}
 """The examples that stand below the last of their kinds."""
 TITLES = {
     Group.COMPOSITE: "Composites",
@@ -239,9 +277,10 @@ def part(title: str, text: str, *names: str) -> list[str]:
 def section(kind: Kind) -> list[str]:
     """The section of a kind."""
     value = "the node's name" if kind.named_by_value else form(kind.value)
+    own = [key for name, key in kind.keys.items() if name not in GATES]
     return [
         f"### `{kind.name}`", "", kind.doc, "", f"`{kind.name}:` is {value}.", "",
-        "```yaml", kind.example, "```", "", *(table(kind.keys.values()) if kind.keys else []),
+        "```yaml", kind.example, "```", "", *(table(own) if own else []),
         *([*kind.semantics.strip().split("\n"), ""] if kind.semantics else []),
     ]  # fmt: skip
 
@@ -294,6 +333,7 @@ def yaml_page() -> str:
     lines += part("`defaults`", DEFAULTS, "defaults")
     lines += part("`namespace`", NAMESPACE, "namespaces")
     lines += ["### `busy`", "", BUSY + "\n".join(busy()), ""]
+    lines += ["### `on_change` of an action", "", *ON_CHANGE.split("\n")]
     lines += [*QOS.split("\n")]
     lines += record("`timeout` of an action", "`30 s` is short for `{result: 30 s}`.", TIMEOUT)
     lines += record("`retry` of an action", retry_text(), RETRY)
@@ -301,10 +341,11 @@ def yaml_page() -> str:
     lines += record("`timeout` of a service", text, SERVICE_TIMEOUT)
     lines += record("`retry` of a service", "As an action's.", SERVICE_RETRY)
     lines += WHERE.split("\n")
+    lines += ["## What is left out", "", *table(GATES.values()), *LEFT_OUT.split("\n")]
     for group, title in TITLES.items():
         lines += [f"## {title}", ""]
         if group is Group.LEAF:
-            lines += [*(ALIAS_HEAD % ALIAS_EXAMPLE).split("\n"), *table(ACTION_KEYS.values())]
+            lines += [*(ALIAS_HEAD % ALIAS_EXAMPLE).split("\n"), *table(DOING)]
         for kind in KINDS.values():
             if kind.group is group:
                 lines += section(kind)

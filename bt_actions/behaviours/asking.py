@@ -25,10 +25,12 @@ class Asking(Timed):
     """Whether it has read a secret in this visit, so that no event tells what it says."""
     refused = False
     """Whether it failed by itself: its child did not, or was not ticked this time."""
+    left_out = False
+    """Whether its parent goes on as if it were not there, once it has ended."""
 
     def _begin_visit(self) -> None:
         """Begin a visit."""
-        self.feedback_message, self.reads_secret = "", False
+        self.feedback_message, self.reads_secret, self.left_out = "", False, False
         self._seconds = 0.0  # where it is given none
         self.initialise()
 

@@ -23,8 +23,6 @@ Work = Generator[Behaviour, None, Status]
 class Working(Asking, Composite):
     """Stops what still runs below when it ends; children have no status when a visit begins."""
 
-    left_out = False
-
     def due_in(self) -> float | None:
         """Return None: a composite has no time of its own, unless it says so."""
         return None
@@ -36,7 +34,7 @@ class Working(Asking, Composite):
     def tick(self) -> Iterator[Behaviour]:
         self.refused, status = False, None
         if self.status is not Status.RUNNING:
-            self.left_out, self.current_child = False, None
+            self.current_child = None
             self._stop_children()
             self.status = Status.RUNNING  # should a child raise, `stop` is to reach the others
             status = self._answer(self._begin_visit)
@@ -238,7 +236,7 @@ class InTurn(Working):
     """A fallback that begins behind the child that has succeeded last.
 
     A visit tries each child once, from there to the last and on from the first. It begins at the
-    first child after all have failed, and after it was stopped while it ran.
+    first child after all have failed, after it was stopped while it ran, and after `shutdown`.
 
     Args:
         name: as in py_trees.
@@ -246,7 +244,7 @@ class InTurn(Working):
     """
 
     passes_on = True
-    in_words = "fallback in turn"
+    in_words = "fallback, in turn"
 
     def __init__(self, name: str, children: Sequence[Behaviour]) -> None:
         super().__init__(name, children)
@@ -273,3 +271,34 @@ class InTurn(Working):
     def terminate(self, new_status: Status) -> None:
         if new_status is Status.INVALID and self.status is Status.RUNNING:
             self._next = 0
+
+    def shutdown(self) -> None:
+        self._next = 0
+
+
+class Resume(Working):
+    """A sequence that goes on, after a failure or a stop, with the child that failed or ran.
+
+    Args:
+        name: as in py_trees.
+        children: in order.
+    """
+
+    passes_on = True
+    in_words = "sequence, resumed"
+
+    def __init__(self, name: str, children: Sequence[Behaviour]) -> None:
+        super().__init__(name, children)
+        self._next = 0
+
+    def work(self) -> Work:
+        while self._next < len(self.children):
+            status = yield from self.ticked(self.children[self._next])
+            if status is not Status.SUCCESS:
+                return status
+            self._next += 1
+        self._next = 0
+        return leave_out(self) if all(map(is_left_out, self.children)) else Status.SUCCESS
+
+    def shutdown(self) -> None:
+        self._next = 0

@@ -5,6 +5,7 @@ A deadline and a guard, which stop their child, a tree inside a tree, and loops.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 
 from py_trees.behaviour import Behaviour
@@ -12,6 +13,8 @@ from py_trees.common import Status
 from py_trees.decorators import Decorator
 
 from bt_actions.behaviours.asking import Asking, Number, Rounds, Tries, actions_below, still_ends
+from bt_actions.behaviours.connected import Stopwatch
+from bt_actions.behaviours.leaving import is_left_out, leave_out
 from bt_actions.goals.policy import Retry
 from bt_actions.utilities.plain_data import plain
 from bt_actions.utilities.shorten import shorten
@@ -34,6 +37,10 @@ class Gate(Asking, Decorator):
     def update(self) -> Status:
         return self.decorated.status
 
+    def without(self) -> Status:
+        """Say what follows from a child that was left out: the node is left out with it."""
+        return leave_out(self)
+
     def due_in(self) -> float | None:
         """Return the seconds until the child can begin anew; 0 without a pause; None if it runs."""
         return None if self.decorated.status is Status.RUNNING else self.left()
@@ -43,9 +50,14 @@ class Gate(Asking, Decorator):
         status, child_failed = self._answer(self._ask), False
         if status is None:
             yield from self.decorated.tick()
-            child_failed = self.decorated.status is Status.FAILURE
-            status = self._answer(self.update) or Status.INVALID
-        self.refused = status is Status.FAILURE and (self.refused or not child_failed)
+            ended = self.decorated.status is not Status.RUNNING
+            if ended and is_left_out(self.decorated):
+                status = self._answer(self.without) or Status.INVALID
+            else:
+                child_failed = self.decorated.status is Status.FAILURE
+                status = self._answer(self.update) or Status.INVALID
+        fails = status is Status.FAILURE and not self.left_out
+        self.refused = fails and (self.refused or not child_failed)
         if status is not Status.RUNNING:
             self.stop(status)
         self.status = status
@@ -121,6 +133,49 @@ class While(Gate):
         return None
 
 
+class Every(Gate):
+    """Begins its child at once, and again that long after its last success.
+
+    Until then it is RUNNING, and does not tick the child. Its clock runs on after a success, and
+    ends with a failure, or when the node is stopped. So it holds its child back in a `Pipeline`,
+    and in a `Repeat`.
+
+    Args:
+        name: as in py_trees.
+        child: what to begin so often.
+        period: seconds on the node's clock; None: once, until the node has failed or was stopped.
+    """
+
+    _since: Stopwatch | None = None
+    """Since the last success."""
+
+    def __init__(self, name: str, child: Behaviour, period: float | None) -> None:
+        super().__init__(name, child)
+        self._period = math.inf if period is None else period
+
+    def gate(self) -> Status | None:
+        return Status.RUNNING if self._pause() > 0.0 else None
+
+    def update(self) -> Status:
+        if self.decorated.status is Status.SUCCESS:
+            self._since = Stopwatch(self._now)
+        return self.decorated.status
+
+    def due_in(self) -> float | None:
+        """Return the seconds until the child begins again; None while it runs, or never does."""
+        pause = self._pause()
+        return None if self.decorated.status is Status.RUNNING or math.isinf(pause) else pause
+
+    def terminate(self, new_status: Status) -> None:
+        if new_status is not Status.SUCCESS:
+            self._since = None
+
+    def _pause(self) -> float:
+        if self._since is None or self.decorated.status is Status.RUNNING:
+            return 0.0
+        return max(0.0, self._period - self._since.passed())
+
+
 class Subtree(Gate):
     """Ticks another tree with inputs of its own.
 
@@ -131,16 +186,25 @@ class Subtree(Gate):
             value or does not fit, which fails the subtree before its first tick.
         end: gives back the outputs, when the tree has succeeded or failed; raises ValueError for
             one that does not fit, which fails the subtree.
+        pass_on: writes the inputs that have changed, before each tick but the first.
     """
 
     passes_on = True
 
     def __init__(
-        self, name: str, child: Behaviour, begin: Callable[[], None], end: Callable[[], None]
+        self,
+        name: str,
+        child: Behaviour,
+        begin: Callable[[], None],
+        end: Callable[[], None],
+        pass_on: Callable[[], None] | None = None,
     ) -> None:
         super().__init__(name, child)
         self._begin = begin
         self._end = end
+        self._pass_on = pass_on
+        if pass_on is not None:
+            self.asks = lambda: True  # at each tick for its inputs
 
     def initialise(self) -> None:
         try:
@@ -148,6 +212,11 @@ class Subtree(Gate):
         except ValueError:
             self.decorated.stop(Status.INVALID)
             raise
+
+    def gate(self) -> Status | None:
+        if self._pass_on is not None and self.status is Status.RUNNING:
+            self._pass_on()
+        return None
 
     def update(self) -> Status:
         status = self.decorated.status
@@ -169,25 +238,57 @@ class Repeat(Rounds, Gate):
         name: as in py_trees.
         child: what to repeat.
         times: how often in all; for ever where not given. May raise ValueError, which fails.
+        until: asked after each round that has succeeded: where it holds, the node succeeds, and
+            when no round is left, it fails. May raise ValueError, which fails.
     """
 
     passes_on = True
 
-    def __init__(self, name: str, child: Behaviour, times: Number) -> None:
+    def __init__(
+        self,
+        name: str,
+        child: Behaviour,
+        times: Number,
+        until: Callable[[], bool] | None = None,
+    ) -> None:
         super().__init__(name, child)
         self._times = times
+        self._until = until
+
+    def initialise(self) -> None:
+        super().initialise()
+        self._idle = False
 
     def gate(self) -> Status | None:
         if self._limit == 0:
             return Status.SUCCESS
         if self.left() > 0.0:
             return Status.RUNNING
+        self._idle = False
         self.tell_round()
         return None
 
+    def without(self) -> Status:
+        if self._limit is not None:
+            return leave_out(self)
+        self._idle = True
+        return Status.RUNNING
+
+    def due_in(self) -> float | None:
+        """Return the seconds until the next round; None while the child runs, or is left out."""
+        return None if self._idle else super().due_in()
+
     def update(self) -> Status:
         status = self.decorated.status
-        return self.count() if status is self._again else status
+        if status is not self._again:
+            return status
+        if self._until is None:
+            return self.count()
+        if self._until():
+            return status
+        if self.count() is status:
+            raise ValueError(f"the condition does not hold after {self._done} rounds")
+        return Status.RUNNING
 
 
 class RetryChild(Tries, Repeat):
@@ -211,6 +312,9 @@ class RetryChild(Tries, Repeat):
         if self.decorated.status is Status.SUCCESS:
             self.tell_success()
         return super().update()
+
+    def without(self) -> Status:
+        return leave_out(self)
 
 
 class ForEach(Repeat):
@@ -244,7 +348,7 @@ class ForEach(Repeat):
 
     def initialise(self) -> None:
         super().initialise()
-        self._failures = 0
+        self._failures = self._left = 0
         items = plain(self._get_items())
         if not isinstance(items, (list, tuple)):
             raise ValueError(f"a list is needed, not {shorten(items, 60)}")
@@ -269,8 +373,20 @@ class ForEach(Repeat):
         if self._failures:
             self.feedback_message += f", {self._failures} failed"
         if status is Status.SUCCESS:
-            return Status.FAILURE if self._failures == self._limit else status
+            done = self._done - self._left
+            return Status.FAILURE if self._failures == done else status
         self._hand_over()
+        return status
+
+    def without(self) -> Status:
+        self._left += 1
+        status = self.count()
+        if status is not Status.SUCCESS:
+            self._hand_over()
+        elif self._left == self._limit:
+            return leave_out(self)
+        elif self._failures == self._done - self._left:
+            return Status.FAILURE
         return status
 
     def _hand_over(self) -> None:

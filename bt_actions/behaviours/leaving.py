@@ -13,15 +13,18 @@ from py_trees import composites, decorators
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_actions.events.kinds import LEFT_OUT
+
 
 def is_left_out(node: Behaviour) -> bool:
     """Return whether a node that has ended was left out."""
     return bool(getattr(node, "left_out", False))
 
 
-def leave_out(node: Behaviour) -> Status:
+def leave_out(node: Behaviour, why: str = "") -> Status:
     """Mark a node as left out; return the status with which its parent goes on."""
     node.left_out = True  # type: ignore[attr-defined]
+    node.feedback_message = f"{LEFT_OUT}: {why}" if why else LEFT_OUT
     above = node.parent
     while isinstance(above, decorators.Decorator):
         above = above.parent
@@ -33,6 +36,9 @@ class _OfChildren:
 
     passes_on = True
     left_out = False
+
+    def initialise(self) -> None:
+        self.left_out, self.feedback_message = False, ""
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
         self.left_out = new_status is not Status.INVALID and all(

@@ -46,6 +46,7 @@ def describe(node: Behaviour, number: int, parent: int | None, index: int | None
 def _settings(node: Behaviour) -> dict[str, Value]:
     memory = getattr(node, "memory", None)
     settings: dict[str, Value] = {} if not isinstance(memory, bool) else {"memory": memory}
+    settings |= getattr(node, "gates", {})
     if isinstance(node, ActionBehaviour):
         settings["timeouts"] = {phase: getattr(node.timeouts, phase) for phase in _PHASES}
         settings["attempts"] = node.retry.attempts

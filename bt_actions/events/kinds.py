@@ -17,6 +17,15 @@ from bt_actions.events.snapshot import Value
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.unaccounted import GoalReport
 
+LEFT_OUT = "left out"
+"""Begins the message of a node that has ended and was left out, whatever its status."""
+
+
+def says_left_out(status: Status, message: str) -> bool:
+    """Whether a node of this status and message was left out."""
+    is_over = status in (Status.SUCCESS, Status.FAILURE)
+    return is_over and (message == LEFT_OUT or message.startswith(f"{LEFT_OUT}: "))
+
 
 class Moment(NamedTuple):
     """When something happened, and its place in the order of all events of a runner."""
@@ -49,6 +58,7 @@ class Node:
     """The short name of the action's type."""
     settings: Mapping[str, Value] = field(default_factory=dict)
     """The policies of the node: `timeouts` in seconds by phase, `attempts`, `expect`, `memory`,
+    `only_if`, `only_while`,
     `constants` by message (``{"feedback": {"status": {"2": "MOVING"}}}``)."""
     index: int | None = None
     """Of a node that was inserted: its place among its siblings, from 0."""
@@ -111,6 +121,11 @@ class NodeChanged(Event):
     """Of a SUCCESS: why that may not be what was meant."""
     due_in: float | None = None
     """Of RUNNING: seconds until the node's own time runs out, where it has one."""
+
+    @property
+    def is_left_out(self) -> bool:
+        """Whether the node was left out: its parent goes on as if it were not there."""
+        return says_left_out(self.status, self.message)
 
 
 @dataclass(frozen=True, slots=True)

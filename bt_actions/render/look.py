@@ -17,6 +17,7 @@ from bt_actions.utilities.plain_text import clean
 
 DOWN_UP_TO = 16
 """Leaves up to which a picture grows down, as py_trees draws; a wider one grows to the right."""
+GATES = ("only_if", "only_while")
 COMPOSITES = ("sequence", "fallback", "parallel")
 STATIC = Path(__file__).parent / "static"
 """The modules that a drawn tree and the page of a run share."""
@@ -88,7 +89,12 @@ def label(node: Node) -> tuple[list[str], list[str]]:
             else:
                 lines[-1] = line
     under = [node.server, node.action] if node.server else [node.kind]
-    return lines, [clean(line) for line in under if line]
+    return lines, [clean(line) for line in (*under, *gates_of(node)) if line]
+
+
+def gates_of(node: Node) -> list[str]:
+    """Return the conditions under which a node is there at all."""
+    return [f"{key} {node.settings[key]!s}" for key in GATES if key in node.settings]
 
 
 def word_of(node: Node) -> str:

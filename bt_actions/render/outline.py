@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bt_actions.events import Node
-from bt_actions.render.look import COMPOSITES, NodeRow, left_out, rows, word_of
+from bt_actions.render.look import COMPOSITES, NodeRow, gates_of, left_out, rows, word_of
 from bt_actions.utilities.plain_text import clean
 
 
@@ -41,6 +41,10 @@ def _symbol(row: NodeRow) -> str:
 
 
 def _remark(node: Node) -> str:
+    parts = [node.kind]
     if node.server:
-        return f"  ({node.server}: {node.action})"
-    return "" if word_of(node) in ("sequence", "fallback") else f"  ({node.kind})"
+        parts = [f"{node.server}: {node.action}"]
+    elif word_of(node) in ("sequence", "fallback"):
+        parts = [node.kind.partition(", ")[2]]
+    said = ", ".join(part for part in (*parts, *gates_of(node)) if part)
+    return f"  ({said})" if said else ""

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 
 from bt_actions.events import Node
 from bt_actions.render.graphviz import RenderError
-from bt_actions.render.look import STATIC, NodeRow, direction_of, rows
+from bt_actions.render.look import STATIC, NodeRow, direction_of, gates_of, rows
 from bt_actions.render.one_file import data_text, policy, script
 from bt_actions.render.outline import text
 from bt_actions.utilities.plain_text import clean
@@ -92,6 +92,7 @@ def _data(
             "kind": clean(node.kind),
             "server": clean(node.server),
             "type": clean(node.action),
+            "gates": gates_of(node),
             "place": node.place,
             "yaml": card.yaml if card is not None else "",
             "tables": [shared.setdefault(each, len(shared)) for each in card.tables]

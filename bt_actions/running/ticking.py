@@ -79,6 +79,7 @@ class ChangeVisitor(VisitorBase):
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
         self._kinds = {Behaviour}  # of what was visited: anything, for a tree that shows nothing
+        self._asking: list[Callable[[], bool]] = []  # whether they ask at each tick
         self._known: dict[Behaviour, Status] = {}  # at the last tick of each
         self._live: dict[Behaviour, None] = {}  # told of as RUNNING
         self._changed = False
@@ -133,6 +134,7 @@ class ChangeVisitor(VisitorBase):
         """Return whether a tick, also one that raised, has changed a status."""
         if self._visited != self._visited_before:
             self._kinds = {type(node) for node in self._visited}
+            self._asking = [node.asks for node in self._visited if hasattr(node, "asks")]
             self._visited_before = self._visited
         self.stopped()
         return self._changed
@@ -148,6 +150,8 @@ class ChangeVisitor(VisitorBase):
     @property
     def watching(self) -> bool:
         """Whether any that was ticked may watch what tells nobody, as the clock or a variable."""
+        if any(asks() for asks in self._asking):
+            return True
         ours = ActionBehaviour.tick, ActionBehaviour.update
         return any(
             (kind.tick, kind.update) != ours and not vars(kind).get("passes_on")

@@ -32,6 +32,7 @@ from bt_actions.events.kinds import (
     TickLasts,
     TreeFinished,
     VariableWritten,
+    says_left_out,
 )
 from bt_actions.events.snapshot import Value
 from bt_actions.goals.policy import End
@@ -68,6 +69,16 @@ class NodeStory:
     """The latest round of a loop."""
     pending: list[Failure] = field(default_factory=list)
     """Failures at or below it that nobody above it has dealt with yet."""
+
+    @property
+    def is_left_out(self) -> bool:
+        """Whether the node has ended as if it were not there."""
+        return says_left_out(self.status, self.message)
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the node has ended in a FAILURE that is one."""
+        return self.status is Status.FAILURE and not self.is_left_out
 
     @property
     def is_leaf(self) -> bool:
@@ -213,7 +224,7 @@ class State:
         story.since, story.warning, story.due_in = event.at, event.warning, event.due_in
         if event.warning and event.status is Status.SUCCESS:
             self._warnings[event.node] = Warned(story.node, self.path(event.node), event.warning)
-        if event.status is Status.FAILURE:
+        if event.status is Status.FAILURE and not event.is_left_out:
             self._failed(story, event)
         elif event.status is not Status.RUNNING:
             for child in story.children:
@@ -223,7 +234,7 @@ class State:
         passed: list[Failure] = []
         for child in story.children:
             below = self.nodes[child]
-            failed = below.status is Status.FAILURE and below.number > story.ended
+            failed = below.has_failed and below.number > story.ended
             if failed and not event.by_itself:
                 passed += below.pending
                 below.pending = []

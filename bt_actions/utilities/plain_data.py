@@ -80,3 +80,11 @@ def shortest(value: Any) -> Any:
 def of_float32(value: Any) -> bool:
     """Whether a numpy scalar, or the items of an array, are float32."""
     return getattr(value, "typecode", None) == "f" or str(getattr(value, "dtype", "")) == "float32"
+
+
+def same(one: object, other: object) -> bool:
+    """Return whether two values are equal; of arrays that can be told of the same one alone."""
+    try:
+        return bool(one == other)
+    except ValueError:
+        return False

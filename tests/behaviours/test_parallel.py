@@ -55,3 +55,10 @@ def test_a_child_is_not_ticked_once_one_before_it_has_decided() -> None:
     assert runs.status is Status.RUNNING
     assert [node.name for node in parallel.tick()] == ["decides", "one"]
     assert (parallel.status, runs.status) == (Status.SUCCESS, Status.INVALID)
+
+
+def test_a_parallel_fails_after_so_many_failures_though_it_might_still_succeed() -> None:
+    fails, other, runs = Failure("a"), Failure("b"), Runs("c")
+    parallel = Parallel("one", [fails, other, runs], at_least=1, fails_after=2)
+    assert [node.name for node in parallel.tick()] == ["a", "b", "one"]
+    assert (parallel.status, runs.status) == (Status.FAILURE, Status.INVALID)

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from py_trees import composites, decorators
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from robot_control_interfaces.action import MoveRobot
 from std_msgs.msg import Bool
 
 from bt_actions.behaviours.composites import If, Recover
-from bt_actions.events import GoalChanged
+from bt_actions.behaviours.leaving import Invert, Sequence
+from bt_actions.events import GoalChanged, NodeChanged
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
 
 Load = Callable[..., Behaviour]
@@ -102,3 +104,156 @@ def test_a_condition_whose_topic_is_silent_fails_and_chooses_nothing(
     runner = VirtualRunner(root, network)
     assert runner.run() is Status.FAILURE
     assert root.feedback_message.startswith("nothing has come on /near yet ($near)")
+
+
+def test_a_goal_that_is_left_out_ends_before_its_parent_goes_on(
+    load: Load, network: VirtualNetwork
+) -> None:
+    root = load(f"""{HEAD}
+  sequence: S
+  children:
+    - move: Slowly
+      goal: {{distance: 3.0}}
+      only_while: $near.data
+    - lift: Up
+      goal: {{distance: 1.0}}
+""")
+    network.publish("near", Bool(data=True), latched=True)
+    runner = VirtualRunner(root, network)
+    runner.start()
+    runner.advance(1.0)
+    network.publish("near", Bool(data=False), latched=True)
+    runner.advance(0.5)
+    slowly = root.children[0]
+    assert slowly.feedback_message == "$near.data is false; waiting for Slowly to end"
+    assert runner.run() is Status.SUCCESS
+    assert states(runner) == ["Slowly EXECUTING", "Slowly DONE", "Up EXECUTING", "Up DONE"]
+    ended = [
+        event for event in runner.events if isinstance(event, NodeChanged) and event.is_left_out
+    ]
+    assert [runner.state.nodes[event.node].node.name for event in ended] == ["Slowly"]
+
+
+def test_a_gate_is_told_with_its_node_and_is_no_failure(
+    load: Load, network: VirtualNetwork
+) -> None:
+    root = load(f"""{HEAD}
+  fallback: F
+  children:
+    - {{success: A, only_if: $near.data}}
+    - {{failure: B}}
+""")
+    network.publish("near", Bool(data=False), latched=True)
+    runner = VirtualRunner(root, network)
+    assert runner.run() is Status.FAILURE
+    assert [failure.node.name for failure in runner.state.failures] == ["B"]
+    gated = next(each.node for each in runner.state.nodes.values() if each.node.name == "A")
+    assert gated.settings == {"only_if": "$near.data"}
+    assert not runner.state.dealt_with
+
+
+def test_a_gate_waits_for_a_first_message_and_then_fails_with_what_to_ask(
+    load: Load, network: VirtualNetwork
+) -> None:
+    network.publisher(Bool, "near", latched=True)
+    root = load(f"{HEAD}  success: A\n  only_if: $near.data\n")
+    runner = VirtualRunner(root, network)
+    runner.start()
+    assert runner.advance(0.5) is None
+    assert runner.run() is Status.FAILURE
+    assert root.feedback_message.startswith("only_if: nothing has come on /near yet")
+    assert root.feedback_message.endswith("; 'known($near)' asks whether it has a value")
+
+
+def test_without_a_gate_a_tree_is_made_of_py_trees_own_composites(load: Load) -> None:
+    tree = "tree: t\nroot: {{sequence: S{0}, children: [{{invert: I, child: {{failure: A}}}}]}}\n"
+    plain, gated = load(tree.format("")), load(tree.format(", only_if: 1 == 1"))
+    assert [type(plain), type(plain.children[0])] == [composites.Sequence, decorators.Inverter]
+    assert [type(gated), type(gated.children[0])] == [Sequence, Invert]
+
+
+def test_gates_of_a_tree_that_is_included_reach_the_one_around_it(load: Load) -> None:
+    inner = "tree: inner\ninputs: {on: bool}\nroot: {success: A, only_if: $on}\n"
+    root = load(
+        "tree: t\nroot: {fallback: F, children: [{subtree: inner, with: {on: false}},"
+        " {failure: B}]}\n",
+        inner=inner,
+    )
+    runner = VirtualRunner(root)
+    assert runner.run() is Status.FAILURE
+    assert [failure.node.name for failure in runner.state.failures] == ["B"]
+
+
+def test_what_is_planned_anew_meanwhile_is_planned_as_often_as_it_says(
+    load: Load, network: VirtualNetwork
+) -> None:
+    root = load(f"""{HEAD}
+  pipeline: P
+  children:
+    - every: 1 s
+      child: {{move: Plan, goal: {{distance: 0.5}}}}
+    - lift: Follow
+      goal: {{distance: 4.9}}
+""")
+    runner = VirtualRunner(root, network)
+    assert runner.run() is Status.SUCCESS
+    assert [name for name, _ in runner.outcomes].count("Plan") == 4
+    assert 5.0 < runner.now < 6.5
+
+
+def sent(runner: VirtualRunner) -> list[float]:
+    """The distances of all goals, in order."""
+    return [
+        event.goal["distance"]
+        for event in runner.events
+        if isinstance(event, GoalChanged) and event.state == "SENDING"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("on_change", "wanted"), [("ignore", [3.0]), ("replace", [3.0, 1.0]), ("cancel", [3.0, 1.0])]
+)
+def test_a_goal_follows_what_another_node_writes(
+    load: Load, network: VirtualNetwork, on_change: str, wanted: list[float]
+) -> None:
+    root = load(f"""{HEAD}
+  sequence: S
+  children:
+    - set: {{far: 3.0}}
+    - parallel: P
+      policy: one
+      children:
+        - {{lift: Follow, goal: {{distance: $far}}, on_change: {on_change}}}
+        - sequence: Later
+          children: [{{wait: 1 s}}, {{set: {{far: 1.0}}}}, {{wait: 1 h}}]
+""")
+    runner = VirtualRunner(root, network)
+    assert runner.run() is Status.SUCCESS
+    assert sent(runner) == wanted
+
+
+def test_a_subtree_hands_changed_inputs_on_while_it_runs(
+    load: Load, network: VirtualNetwork
+) -> None:
+    inner = HEAD.replace("tree: t", "tree: inner\ninputs: {far: float64}").replace(
+        "topics: {near: {topic: near, type: std_msgs/msg/Bool, qos: latched}}\n", ""
+    )
+    inner += "  {lift: Follow, goal: {distance: $far}, on_change: replace}\n"
+    for on_change, wanted in (("pass", [3.0, 1.0]), ("ignore", [3.0])):
+        root = load(
+            f"""{HEAD}
+  sequence: S
+  children:
+    - set: {{far: 3.0}}
+    - parallel: P
+      policy: one
+      children:
+        - {{subtree: inner, with: {{far: $far}}, on_change: {on_change}}}
+        - sequence: Later
+          children: [{{wait: 1 s}}, {{set: {{far: 1.0}}}}, {{wait: 1 h}}]
+""",
+            inner=inner,
+        )
+        runner = VirtualRunner(root, network)
+        assert runner.run() is Status.SUCCESS
+        assert sent(runner) == wanted

@@ -25,6 +25,7 @@ from bt_actions.document import check_file, load_tree, tree_outputs
 from bt_actions.document.formatting.format import format_source
 from bt_actions.document.kinds import KINDS
 from bt_actions.document.yaml.source import read_source
+from bt_actions.events import Logged
 from bt_actions.running.ticking import ChangeVisitor
 from bt_actions.testing import Script, ScriptedServer, Simulation, VirtualNetwork, VirtualRunner
 
@@ -154,6 +155,7 @@ def test_what_looks_at_nothing_but_its_children_or_its_goal_costs_no_ticks(node:
     watching = {name for name, kind in KINDS.items() if watches(node(kind.example))}
     assert KINDS.keys() - watching == {
         *("sequence", "fallback", "parallel", "retry", "repeat", "for_each", "subtree"),
+        "pipeline",
         *("invert", "force_success", "force_failure", "run_once", "action", "run_tree"),
     }
 
@@ -245,6 +247,16 @@ def test_a_tree_recovers_before_its_last_attempt(around: Surroundings) -> None:
     behind = load_tree(ROOT / "examples" / "recovering.yaml", {"to": -1.0})
     assert around.run(behind) is Status.FAILURE
     assert around.pose() == pytest.approx(0.0, abs=0.02)
+
+
+def test_what_comes_first_is_done_again_while_the_robot_moves(around: Surroundings) -> None:
+    runner = VirtualRunner(example("following"), around.network)
+    assert runner.run() is Status.SUCCESS
+    said = [event for event in runner.events if isinstance(event, Logged)]
+    assert len(said) >= 2
+    assert around.pose() == pytest.approx(1.0, abs=0.02)
+    assert VirtualRunner(runner.tree, around.network).run() is Status.SUCCESS
+    assert around.pose() == pytest.approx(2.0, abs=0.02)
 
 
 def test_namespaces_tell_two_robots_apart(around: Surroundings) -> None:

@@ -29,7 +29,7 @@ root:
   sequence: S
   children:
     - set: {asked: 0}
-    - every: Ask
+    - often: Ask
       period: 10 s
       child:
         set: {asked: = $asked + 1}
@@ -38,30 +38,30 @@ root:
 
 
 @pytest.fixture(scope="module")
-def every() -> Iterator[type[decorators.Gate]]:
+def often() -> Iterator[type[decorators.Gate]]:
     """Add what CONTRIBUTING.md adds, and return its behaviour's class."""
     kinds, keys = dict(KINDS), set(NODE_KEYS)
     behaviour, kind = CODE.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
     with pytest.MonkeyPatch.context() as patch:
         space = dict(vars(decorators))
         exec(behaviour, space)
-        patch.setattr(decorators, "Every", space["Every"], raising=False)
+        patch.setattr(decorators, "Often", space["Often"], raising=False)
         exec(kind, space)
         register(space["KIND"])
-        yield space["Every"]
+        yield space["Often"]
     KINDS.clear()
     KINDS.update(kinds)
     NODE_KEYS.intersection_update(keys)
 
 
 def test_a_kind_that_is_added_is_built_and_does_what_it_says(
-    every: type[decorators.Gate], load: Callable[[str], Behaviour], monkeypatch: pytest.MonkeyPatch
+    often: type[decorators.Gate], load: Callable[[str], Behaviour], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [0.0]
-    monkeypatch.setattr(every, "_now", lambda _self: now[0])
+    monkeypatch.setattr(often, "_now", lambda _self: now[0])
     root = load(TREE)
     node = root.children[1]
-    assert (type(node), in_words(node)) == (every, "every")
+    assert (type(node), in_words(node)) == (often, "often")
     for at, asked in ((0.0, 1), (9.0, 1), (10.0, 2), (19.0, 2)):
         now[0] = at
         root.tick_once()
@@ -75,31 +75,31 @@ def test_a_kind_that_is_added_is_built_and_does_what_it_says(
         ("10 s", "= 1 - 2", "BT110", "at least 0 is needed"),
         ("10 s", "= 'a'", "BT204", "is needed"),
         ("period", "preiod", "BT107", "did you mean 'period'?"),
-        ("every:", "evry:", "BT201", "did you mean 'every'?"),
-        ("- success: Never", "- every: Alone", "BT108", "needs the key 'period'"),
-        ("root:", "actions: {every: {}}\nroot:", "BT208", "'every' is a kind of node"),
+        ("often:", "ofen:", "BT201", "did you mean 'often'?"),
+        ("- success: Never", "- often: Alone", "BT108", "needs the key 'period'"),
+        ("root:", "actions: {often: {}}\nroot:", "BT208", "'often' is a kind of node"),
         ("root:", "actions: {period: {}}\nroot:", "BT208", "'period' is a key of nodes"),
     ],
 )
-@pytest.mark.usefixtures("every")
+@pytest.mark.usefixtures("often")
 def test_a_kind_that_is_added_is_checked(written: str, instead: str, code: str, told: str) -> None:
     found = check_source(Source("t.yaml", TREE.replace(written, instead, 1)))
     assert [one for one in found if one.code == code and told in one.message], found
 
 
-@pytest.mark.usefixtures("every")
+@pytest.mark.usefixtures("often")
 def test_the_passes_of_the_checker_ask_a_kind_that_is_added() -> None:
     found = check_source(Source("t.yaml", TREE))
     assert [(one.code, one.line) for one in found] == [("BT305", 11)]  # as it never succeeds
 
 
-@pytest.mark.usefixtures("every")
+@pytest.mark.usefixtures("often")
 def test_a_kind_that_is_added_is_formatted_and_in_the_schema() -> None:
     turned = TREE.replace("      period: 10 s\n", "").replace(
         "= $asked + 1}\n", "= $asked + 1}\n      period: 10 s\n"
     )
     assert format_source(Source("t.yaml", turned)) == format_source(Source("t.yaml", TREE))
-    assert json_schema()["$defs"]["every"]["required"] == ["every", "child", "period"]
+    assert json_schema()["$defs"]["often"]["required"] == ["often", "child", "period"]
 
 
 def test_a_name_has_one_kind() -> None:

@@ -18,6 +18,7 @@ from bt_actions.events import (
     StopWanted,
     TickLasts,
 )
+from bt_actions.events.kinds import LEFT_OUT
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory
 from bt_actions.story.doing import doing
@@ -92,6 +93,10 @@ class LineView(View):
                 self._nodes.pop(event.node, None)
             return
         self._nodes[event.node] = event.status
+        if event.is_left_out:
+            why = event.message.removeprefix(LEFT_OUT).removeprefix(": ")
+            self._line(event.at.steady, LEFT_OUT, event.node, why)
+            return
         self._line(event.at.steady, event.status.value, event.node, self._news(story, event))
 
     def _news(self, story: NodeStory, event: NodeChanged) -> str:

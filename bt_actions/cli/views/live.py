@@ -159,10 +159,11 @@ class LiveView(View):
 
     def _finished(self, story: NodeStory) -> Text:
         name, said = clean(self._state.called(story.node.id)), clean(story.message)
-        if story.node.server:
+        if story.node.server and not story.is_left_out:
             action = self._state.action(story.node.id)
             said = f"{action.server}  {clean(goal_text(action))}  {action.lately:.2f} s"
-        glyph = self._glyph(story.status), _STYLES[story.status]
+        status = Status.INVALID if story.is_left_out else story.status
+        glyph = self._glyph(status), _STYLES[status]
         return Text.assemble(glyph, " ", name, (f"  {said}" if said else "", "dim"))
 
     def _lines(self, now: float, most: int) -> list[Text]:

@@ -9,10 +9,12 @@ from typing import Any
 
 from py_trees.behaviour import Behaviour
 
+from bt_actions.behaviours.gates import gate
 from bt_actions.behaviours.topics import TopicValue, patient
 from bt_actions.document.building.context import Context, Scope
 from bt_actions.document.findings import NODE
 from bt_actions.document.language.classes import Python
+from bt_actions.document.language.keys import GATES
 from bt_actions.document.language.values import computed_in
 from bt_actions.document.reading.inputs import inputs_of
 from bt_actions.document.reading.tree import (
@@ -85,8 +87,14 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
     for child in node.children:  # a comprehension would take a level of recursion of its own
         children.append(_node(child, context))  # noqa: PERF401
     behaviour = node.kind.build(node, context, *children)
-    if context.topics and not (node.kind.only_asks and node.kind.slow):  # which waits anyway
+    gates = {key: node.values[key] for key in GATES if key in node.values}
+    if gates:
+        conditions = {key: context.why_not(key, written) for key, written in gates.items()}
+        gate(behaviour, {key: context.said(each) for key, each in gates.items()}, **conditions)
+    if context.topics:
         written = settings_of(node, context.document) if node.is_action else node.values
+        if node.kind.only_asks and node.kind.slow:  # which waits anyway
+            written = gates
         names = {name for each in computed_in(written) for name in each.expression.variables}
         if read := [topic for name, topic in context.topics.items() if name in names]:
             patient(behaviour, read)

@@ -18,6 +18,7 @@ from typing import Any
 
 from py_trees.blackboard import Blackboard, KeyMetaData
 
+from bt_actions.behaviours.leaves import stood_for
 from bt_actions.behaviours.reading import Formula, Names
 from bt_actions.behaviours.topics import TopicValue
 from bt_actions.behaviours.variables import hide, is_hidden, unhide, value_of, write
@@ -31,6 +32,7 @@ from bt_actions.expressions.expression import Expression
 from bt_actions.messages import fields
 
 _NUMBERS = {*fields.FLOATS, *fields.INTEGERS} - {"byte"}
+_NAME_ALONE = re.compile(r"\$[\w.]+")
 _ODD = re.compile(r"[^A-Za-z0-9_]")
 _LOADS = "/bt/loads"
 """The blackboard's key of its own `_Loads`: on one that was cleared they begin anew."""
@@ -210,6 +212,35 @@ class Context:
         declared = self.document.outputs.get(name) or self.document.inputs.get(name)
         kind = None if declared is None else declared.values.get("type")
         return kind if isinstance(kind, str) else None
+
+    def said(self, written: object) -> str:
+        """A condition in one short line."""
+        assert isinstance(written, Computed)
+        return plain_name(written.expression.text)
+
+    def why_not(self, key: str, written: object) -> Callable[[], str]:
+        """A condition as a function that says what it is where it is false; or "".
+
+        The function raises ValueError where the condition cannot be computed.
+        """
+        assert isinstance(written, Computed)
+        expression, holds = written.expression, self.holds(written)
+
+        def why_not() -> str:
+            try:
+                if holds():
+                    return ""
+            except ValueError as error:
+                name = next(iter(expression.variables), "name")
+                asks = f"'known(${name})' asks whether it has a value"
+                raise ValueError(f"{key}: {error}; {asks}") from None
+            text = expression.text.strip()
+            stood = stood_for(expression, self.read)
+            if _NAME_ALONE.fullmatch(text):
+                stood = ""
+            return f"{text} is false{stood}"
+
+        return why_not
 
     def holds(self, written: object) -> Callable[[], bool]:
         """A condition over variables alone as a function, which raises ExpressionError."""

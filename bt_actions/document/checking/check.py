@@ -15,6 +15,7 @@ from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.names import check_names
 from bt_actions.document.checking.value_types import FLOAT, INTEGER
 from bt_actions.document.findings import Related
+from bt_actions.document.language.keys import GATES
 from bt_actions.document.language.scalars import Duration, Whole
 from bt_actions.document.language.types import TypeNameError, parse_type
 from bt_actions.document.language.values import (
@@ -49,6 +50,8 @@ def check_document(checker: Checker) -> None:
 
 def _check_form(checker: Checker, node: TreeNode) -> None:
     """Check what the forms of a kind's keys tell of it: condition, number, what it talks over."""
+    for key in GATES:
+        checker.condition(node.values.get(key), {})
     kind = node.kind
     form = kind.keys[kind.reads].shape if kind.reads in kind.keys else kind.value
     value = node.values.get(kind.reads)

@@ -7,18 +7,20 @@ single kinds are in `document/kinds/`.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.reads import find_early_reads, find_missing
 from bt_actions.document.checking.verdicts import Verdicts
 from bt_actions.document.findings import Related
+from bt_actions.document.language.keys import GATES
 from bt_actions.document.language.kinds import Can, End, Group
-from bt_actions.document.language.values import Computed
+from bt_actions.document.language.values import Computed, computed_in
 from bt_actions.document.reading.tree import (
     Declared,
     Document,
     TreeNode,
+    settings_of,
     shared_settings,
 )
 from bt_actions.document.reading.unread import Doubts
@@ -47,6 +49,7 @@ class Hazards:
         self.held: dict[tuple[int, str], dict[str, TreeNode]] = {}
         """What trees that are included hold (`resources_below`)."""
         self._slow: dict[int, bool] = {}
+        self._above: dict[int, TreeNode] = {}
         self._anew: dict[int, TreeNode | None] = {}
         names = (None, *checker.document.actions)
         self._bounded = {one for one in names if _bounds(shared_settings(one, checker.document))}
@@ -71,11 +74,16 @@ class Hazards:
                 self._used.add(node.alias)
             if node.is_action and not inside:
                 self._look_at_action(node)
+            if node.is_action:
+                self._follows(node)
+            for key in GATES:
+                if isinstance(condition := node.values.get(key), Computed):
+                    self.constant(condition)
             if not node.children:
                 continue
             if kind.warn is not None:
                 kind.warn(self, node, inside)
-            if kind.in_turn is not None:
+            if kind.in_turn is not None and not node.values.get("in_turn"):
                 self._unreachable(node, kind.in_turn)
                 if node.values.get("memory") is False:
                     self._reactive(node, kind.in_turn)
@@ -108,6 +116,18 @@ class Hazards:
             at = declared.key if own and declared is not None else node.key
             self._no_result_timeout(at, f"{name!r} has no result timeout: it may take for ever")
 
+    # BT324
+
+    def _follows(self, node: TreeNode) -> None:
+        """Report a goal that is to follow changes, and reads nothing that could change."""
+        settings = settings_of(node, self.document)
+        if settings.get("on_change", "ignore") == "ignore" or self.doubts.own(node):
+            return
+        reads = (each.expression.variables for each in computed_in(settings.get("goal")))
+        if not any(reads):
+            at = node.written.get("on_change", node.key)
+            self._report("BT324", span_of(at), "this goal reads no variable, and never changes")
+
     # BT305, BT306
 
     def _unreachable(self, node: TreeNode, onward: End) -> None:
@@ -121,13 +141,7 @@ class Hazards:
                 return
 
     def _reactive(self, node: TreeNode, onward: End) -> None:
-        slow = (self.takes_time(child) for child in node.children)
-        last = max((at for at, takes in enumerate(slow) if takes), default=0)
-        begun_anew = [
-            self._restarted(child) or child
-            for child in node.children[:last]
-            if _can(self.verdicts.of(child), onward) and not _can(self._at_once.of(child), onward)
-        ]
+        begun_anew = self.begin_anew(node.children, onward)
         if not begun_anew or self.doubts.below(node):
             return
         for begun in begun_anew:
@@ -136,6 +150,23 @@ class Hazards:
                 f"this starts again while a later child of {node.name!r} runs, and interrupts it",
                 related=Related(node.place, "because of 'memory: false' here"),
             )  # fmt: skip
+
+    def begin_anew(self, children: Sequence[TreeNode], onward: End) -> list[TreeNode]:
+        """What takes time in children that can end so, and begin again while a later one runs."""
+        slow = (self.takes_time(child) for child in children)
+        last = max((at for at, takes in enumerate(slow) if takes), default=0)
+        return [
+            self._restarted(child) or child
+            for child in children[:last]
+            if _can(self.verdicts.of(child), onward) and not _can(self._at_once.of(child), onward)
+        ]
+
+    def above(self, node: TreeNode) -> TreeNode | None:
+        """The node that holds this one; None at the root."""
+        if not self._above:
+            for each in self.document.nodes():
+                self._above |= {id(child): each for child in each.children}
+        return self._above.get(id(node))
 
     def _restarted(self, root: TreeNode) -> TreeNode | None:
         """The first leaf below that takes time whenever it is begun, or the tree it is in."""

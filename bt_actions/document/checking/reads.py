@@ -80,7 +80,11 @@ class _Order:
             return own, own if kind.includes else _NOTHING
         if kind.again is End.SUCCESS:  # a read in its first round has nothing yet
             later |= self._below(node)
-        elif kind.again is not None or node.values.get("memory") is False:
+        elif (
+            kind.again is not None
+            or node.values.get("memory") is False
+            or node.values.get("in_turn") is True
+        ):
             around |= self._below(node)
         if End.SUCCESS not in (kind.again, kind.in_turn):  # may go on after a read that failed
             around |= later

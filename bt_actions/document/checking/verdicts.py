@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bt_actions.document.language.keys import GATES
 from bt_actions.document.language.kinds import EITHER, Can, Group
 from bt_actions.document.language.shapes import Record
 from bt_actions.document.reading.tree import Document, TreeNode, settings_of
@@ -32,6 +33,8 @@ class Verdicts:
             return Can(False, False)
         below = _below(node)
         if not below and (kind.includes or kind.group is not Group.LEAF):
+            return EITHER
+        if not self._at_once and not GATES.keys().isdisjoint(node.values):
             return EITHER
         return kind.ends(node.values, [self.of(child) for child in below], self._at_once)
 

@@ -22,7 +22,8 @@ _OFTEN = "children that succeeded are not run again within a visit"
 _KINDS = _table(
     {
         "here it is 'sequence'": "serial series steps block asyncsequence",
-        f"here it is 'sequence': {_OFTEN}": "sequencewithmemory sequencestar memsequence",
+        "here it is 'sequence' with 'memory: resume'": "sequencewithmemory sequencestar",
+        f"here it is 'sequence': {_OFTEN}": "memsequence",
         "here it is 'sequence' with 'memory: false'": "reactivesequence",
         "here it is 'fallback'": "selector asyncfallback fallbackstar selectorwithmemory try",
         "here it is 'fallback' with 'memory: false'": "reactivefallback reactiveselector",
@@ -52,13 +53,11 @@ _KINDS = _table(
         "here it is 'service'": "callservice servicecall serviceclient call",
         "here it is 'action'": "sendgoal actionclient",
         "write an 'if', and another one as its else": "switch case match",
-        "write a 'repeat' of a 'sequence' that has a 'wait' last": "every ratecontroller rate "
-        "throttle periodic",
+        "here it is 'every', in a 'pipeline' or a 'repeat'": "ratecontroller rate throttle "
+        "periodic",
         "here it is 'retry', with a recover beside its child": "recover recovery recoverynode",
-        "write a 'fallback' of 'sequence's, each with a 'check' of whose turn it is and a 'set' of "
-        "the next": "roundrobin",
-        "write a 'parallel' in which a 'repeat' does the earlier part again": "pipeline "
-        "pipelinesequence",
+        "write a 'fallback' with in_turn: true": "roundrobin",
+        "here it is 'pipeline'": "pipelinesequence",
     }
 )  # fmt: skip
 """What a kind of node is called elsewhere, in small letters and without underscores."""
@@ -77,6 +76,8 @@ _KEYS: dict[str, tuple[str, ...]] = {
         "delay delayms pause": ("after", "backoff", _AGAIN),
         "msec seconds duration timeoutms": ("after", "timeout"),
         "until successcondition condition": ("expect", "when", "until"),
+        "when if precondition": ("only_if",),
+        "unless": ("only_if: not ...",),
         "threshold successthreshold successcount": ("policy",),
         "actionname servername servicename remap remappings": ("server",),
         "topicname": ("topic",),
@@ -90,8 +91,7 @@ _INSTEAD: dict[str, tuple[str, str]] = {
     word: (beside, here)
     for words, beside, here in (
         ("loop withitems", "", "put the node into a 'for_each'"),
-        ("when if onlyif skipif precondition", "",
-         "put a 'check' before the node, in a 'sequence'"),
+        ("skipif", "", "write 'only_if: not ...'"),
         ("onsuccess post", "", "put a 'set' behind the node, in a 'sequence'"),
         ("dependson requires", "", "the children of a 'sequence' run one after the other"),
         ("environment env envfile", "",

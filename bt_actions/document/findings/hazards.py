@@ -206,4 +206,13 @@ HAZARDS = (
         tree("inputs: {ready: bool}\nroot:\n  if: $ready\n  then: {success: Go}\n"
              "  else: {success: Stay}\n"),
     ),
+    _warning("BT324", "a node that has no effect here",
+        "An 'every' holds its child back where something begins it again within a visit: below a "
+        "'pipeline', or a 'repeat'. A pipeline of one child has nothing to do again meanwhile, and "
+        "a goal without variables nothing to follow.",
+        tree("root:\n  sequence: Work\n  children:\n"
+             "    - every: 1 s\n      child: {success: Plan}\n    - success: Go\n"),
+        tree("root:\n  pipeline: Work\n  children:\n"
+             "    - every: 1 s\n      child: {success: Plan}\n    - success: Go\n"),
+    ),
 )  # fmt: skip

@@ -4,8 +4,9 @@ A file says how its kind is read, checked and built; `language/kinds.py` says wh
 builds a node imports its behaviour when it is called: reading and checking need none.
 """
 
-from bt_actions.document.kinds.composites import if_, in_turn, parallel
+from bt_actions.document.kinds.composites import if_, in_turn, parallel, pipeline
 from bt_actions.document.kinds.decorators import (
+    every,
     for_each,
     forced,
     invert,
@@ -36,7 +37,7 @@ __all__ = ["KINDS"]
 
 register(
     *in_turn.KINDS,
-    *(each.KIND for each in (parallel, if_, retry, repeat, timeout, invert)),
+    *(each.KIND for each in (parallel, if_, pipeline, retry, repeat, every, timeout, invert)),
     *forced.KINDS,
     *(each.KIND for each in (run_once, for_each, while_)),
     *(each.KIND for each in (action, run_tree, service, publish, wait_for_message, wait)),

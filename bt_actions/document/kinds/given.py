@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         composites,
         decorators,
         leaves,
+        leaving,
         parallel,
         reading,
         run_tree,
@@ -41,16 +42,17 @@ else:
 
     py_trees = _Later("py_trees")
     build, parts = (_Later(f"bt_actions.document.building.{name}") for name in ("build", "parts"))
-    action, composites, decorators, leaves, parallel, reading, run_tree, service, topics = (
+    action, composites, decorators, leaves, leaving, parallel, reading, run_tree, service = (
         _Later(f"bt_actions.behaviours.{name}")
         for name in (
-            "action", "composites", "decorators", "leaves", "parallel",
-            "reading", "run_tree", "service", "topics",
+            "action", "composites", "decorators", "leaves", "leaving", "parallel",
+            "reading", "run_tree", "service",
         )
     )  # fmt: skip
+    topics = _Later("bt_actions.behaviours.topics")
 
 __all__ = [
     "Behaviour", "Checker", "Context", "Hazards", "TreeNode", "action", "build", "composites",
-    "decorators", "leaves", "parallel", "parts", "py_trees", "reading", "run_tree", "service",
-    "topics",
+    "decorators", "leaves", "leaving", "parallel", "parts", "py_trees", "reading", "run_tree",
+    "service", "topics",
 ]  # fmt: skip

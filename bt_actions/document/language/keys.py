@@ -81,6 +81,9 @@ POLICIES = (
 )  # fmt: skip
 DOING = (
     Key("goal", Values(), "The fields of the goal; what is not named keeps its default."),
+    Key("on_change", Choice(("ignore", "replace", "cancel")),
+        "What to do where the fields are others than were sent, while the goal executes.",
+        default="ignore"),
     *POLICIES,
     Key("expect", Condition(RESULT), "What the result must be, beyond the server's word."),
     Key("save", Table(Place(RESULT)), "Names to keep parts of the result under."),
@@ -89,7 +92,13 @@ DOING = (
         default="the server's name"),
     Key("namespace", NAMESPACE, "Put before a relative name of a server or resource."),
 )  # fmt: skip
-ACTION_KEYS = keyed(*DOING)
+GATES = keyed(
+    Key("only_if", Condition(), "Leave the node out where this is false as it begins."),
+    Key("only_while", Condition(),
+        "Leave the node out where this is false before any tick; what runs is stopped."),
+)  # fmt: skip
+"""What may stand beside every kind."""
+ACTION_KEYS = keyed(*DOING, *GATES.values())
 """What may stand beside an action's alias."""
 ACTION_TYPE = Key("type", TypeName("action"), "The action's type.", required=True,
                   example="robot_control_interfaces/action/MoveRobot")  # fmt: skip

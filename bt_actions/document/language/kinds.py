@@ -14,12 +14,19 @@ The types of a kind's functions name no node, checker or context, as these belon
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES, ConditionOrNode, keyed
+from bt_actions.document.language.keys import (
+    ACTION_KEYS,
+    GATES,
+    NODE,
+    NODES,
+    ConditionOrNode,
+    keyed,
+)
 from bt_actions.document.language.scalars import Condition, NodeName, Shape
 from bt_actions.document.language.shapes import Key, required_in
 
@@ -125,6 +132,8 @@ class Kind:
     """Whether the child is never begun anew after its end."""
     bounds: bool = False
     """Whether the child is stopped after some time."""
+    paces: bool = False
+    """Whether the child is held back after a success, in this visit of the node above."""
     computes: bool = False
     """Whether a missing value is nearly all that a node fails for."""
     semantics: str = ""
@@ -181,7 +190,7 @@ NODE_KEYS = {*ACTION_KEYS, "child", "children"}
 
 Other keys that hold nodes may: beside a kind that has such a key, the word is that key.
 """
-SINCE = dict.fromkeys(("if",), "0.2")
+SINCE = dict.fromkeys(("if", "pipeline", "every", "in_turn", "on_change", *GATES), "0.2")
 """The version of bt_actions since which a word may name no action, where not from the beginning."""
 
 
@@ -190,7 +199,7 @@ def register(*kinds: Kind) -> None:
     for kind in kinds:
         if kind.name in KINDS:
             raise ValueError(f"there is a kind {kind.name!r} already")
-        KINDS[kind.name] = kind
+        KINDS[kind.name] = replace(kind, keys={**kind.keys, **GATES})
         NODE_KEYS.update(kind.keys.keys() - set(kind.holds))
 
 

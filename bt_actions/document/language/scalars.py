@@ -202,30 +202,44 @@ def _odd(text: str) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class Flag:
-    """True or false."""
+    """True or false, or a third `word`."""
 
-    words: str = "true or false"
+    word: str = ""
+
+    @property
+    def words(self) -> str:
+        return f"true, false or {self.word}" if self.word else "true or false"
 
     def read(self, node: Node, source: Source) -> object:
-        if isinstance(node, Scalar) and isinstance(node.value, bool):
-            return node.value
+        if isinstance(node, Scalar):
+            if isinstance(node.value, bool):
+                return node.value
+            if self.word and node.text == self.word:
+                return self.word
         return wrong_form(self, node, source)
 
     def schema(self) -> Schema:
-        return {"type": "boolean"}
+        flag: Schema = {"type": "boolean"}
+        return {"anyOf": [flag, {"const": self.word}]} if self.word else flag
 
 
 @dataclass(frozen=True, slots=True)
 class Whole:
-    """A whole number of at least `least`; with `values`, `$name` may stand for it."""
+    """A whole number of at least `least`; with `values`, `$name` may stand for it, or a `word`."""
 
     least: int = 0
     values: bool = False
-    words: str = "a whole number"
+    word: str = ""
+
+    @property
+    def words(self) -> str:
+        return f"a whole number or {self.word}" if self.word else "a whole number"
 
     def read(self, node: Node, source: Source) -> object:
         if self.values and is_computed(node):
             return read_computed(self, node, source)
+        if self.word and isinstance(node, Scalar) and node.text == self.word:
+            return self.word
         value = node.value if isinstance(node, Scalar) else None
         if isinstance(value, bool) or not isinstance(value, int):
             return wrong_form(self, node, source)
@@ -235,7 +249,10 @@ class Whole:
         return value
 
     def schema(self) -> Schema:
-        return _or_variable({"type": "integer", "minimum": self.least}, self.values)
+        number: Schema = {"type": "integer", "minimum": self.least}
+        if self.word:
+            return {"anyOf": [number, {"const": self.word}]}
+        return _or_variable(number, self.values)
 
 
 @dataclass(frozen=True, slots=True)

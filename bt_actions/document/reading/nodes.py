@@ -336,7 +336,8 @@ class _Reader:
             self._source.report("BT107", span_of(key), message, hint=hint)
         else:
             hint = None
-            if (near := _decorator_of(key.text, keys)) and near not in keys:
+            near = None if key_here(key.text, keys)[0] else _decorator_of(key.text, keys)
+            if near and near not in keys:
                 hint = _around(node.node, key, node.key, near)
             if key.text == "name" and "name" not in keys:
                 hint = f"the name stands behind '{node.key.text}:'"

@@ -112,6 +112,8 @@ class Document:
     size: int = 0
     height: int = 0
     """How many nodes the tree has, and on how many levels, with all that it includes."""
+    gated: bool = False
+    """Whether a node of the tree, or of one that it includes, may be left out."""
     _nodes: tuple[TreeNode, ...] = ()
 
     @property

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from bt_actions.document.findings import DocumentError, Finding, Related, Span
 from bt_actions.document.findings.elsewhere import package_here
+from bt_actions.document.language.keys import GATES
 from bt_actions.document.reading.find import TreeNotFoundError, find_tree, is_file
 from bt_actions.document.reading.nodes import read_root
 from bt_actions.document.reading.read import read_document
@@ -117,13 +118,16 @@ class Workspace:
             return document
         read_root(document)
         size = height = 0
+        gated = False
         for node in document.nodes():
             size += 1
+            gated = gated or not GATES.keys().isdisjoint(node.values)
             if node.level > height:
                 height = node.level
             if node.kind.includes:
                 node.included = self._include(node, chain)
                 if node.included is not None:
+                    gated = gated or node.included.gated
                     size += node.included.size
                     below = node.level + node.included.height
                     if below > MAX_LEVELS:
@@ -137,6 +141,7 @@ class Workspace:
                     source.report("BT105", span_of(node.key), message)
                     break
         document.size, document.height = min(size, MAX_TREE_NODES + 1), height
+        document.gated = gated
         return document
 
     def _include(self, node: TreeNode, chain: tuple[Path, ...]) -> Document | None:

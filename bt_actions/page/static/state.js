@@ -73,7 +73,7 @@ const FOLD = {
       s.pending.delete(n);
       s.from[n] = e.t;
     }
-    s.status[n] = LOOK[e.status];
+    s.status[n] = LOOK[e.status !== "RUNNING" && left_out(e.message) ? "INVALID" : e.status];
     s.message[n] = e.message;
     s.to[n] = e.t;
     s.told[n] = e.at[0];
@@ -84,7 +84,7 @@ const FOLD = {
       s.running.delete(n);
       s.backoff.delete(n);
     }
-    if (e.status === "FAILURE") failed(s, n, e, nodes);
+    if (s.status[n] === "failure") failed(s, n, e, nodes);
     else if (e.status !== "RUNNING") for (const kid of node.ever) settle(s, kid.id, n, nodes);
   },
   GoalChanged(s, e) {
@@ -162,6 +162,9 @@ const failure = (s, n, e, message) => ({ n, t: e.t, number: e.at[0], message, by
 function stop(s, e, nodes) {
   s.stopped = leaves(s, nodes).map((n) => failure(s, n, e, s.message[n]));
 }
+
+// What a node says that has ended as if it were not there.
+const left_out = (message) => /^left out(: |$)/.test(message || "");
 
 function failed(s, n, e, nodes) {
   const passed = [];

@@ -141,6 +141,7 @@ export class Run {
         expect: settings.expect,
         constants: settings.constants || {},
         settings,
+        gates: ["only_if", "only_while"].filter((key) => settings[key]).map((key) => `${key} ${settings[key]}`),
       };
       node.words = `${node.name}\n${node.kind}\n${node.server}\n${node.type}\n${place}`.toLowerCase();
       this.of_id.set(id, node.id);

@@ -37,5 +37,5 @@ export function label(node) {
       else lines[lines.length - 1] = line;
     }
   }
-  return { lines, under: node.server ? [node.server, node.type].filter(Boolean) : [node.kind] };
+  return { lines, under: [...(node.server ? [node.server, node.type].filter(Boolean) : [node.kind]), ...node.gates] };
 }

@@ -26,6 +26,7 @@ from std_msgs.msg import Bool
 
 from bt_actions import load_tree
 from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.behaviours.composites import InTurn
 from bt_actions.behaviours.decorators import Repeat
 from bt_actions.document.findings import LOADED
 from bt_actions.goals.terms import STATUS_ABORTED, STATUS_CANCELED, STATUS_SUCCEEDED
@@ -187,6 +188,10 @@ class World:
             self._loop.interrupt(moment)
             self._step()
             halted = self._take()
+        if number in self.case.halts:
+            for node in self._root.iterate():
+                if isinstance(node, InTurn):
+                    InTurn.shutdown(node)  # the halt of a tree is its end there
         return Tick(status.name[0], events, halted)
 
     def _tick_tree(self) -> Status:
@@ -205,6 +210,8 @@ class World:
     def _step(self) -> Status:
         """Tick the tree once; where its run is over, begin another one."""
         if not self._runs:
+            if self._root.status is not Status.INVALID:
+                self._root.stop(Status.INVALID)  # no clock of the root's runs on
             self._loop.begin(self.network.now())
         step = self._loop.step(self.network.now())
         self._runs = not isinstance(step, Done)

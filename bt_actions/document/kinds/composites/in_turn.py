@@ -1,23 +1,52 @@
 """`sequence` and `fallback`: one child after the other, until one ends them all."""
 
-from bt_actions.document.kinds.given import Behaviour, Context, TreeNode, py_trees
+from bt_actions.document.kinds.given import (
+    Behaviour,
+    Checker,
+    Context,
+    TreeNode,
+    composites,
+    leaving,
+    py_trees,
+)
 from bt_actions.document.language.kinds import Can, End, Settings, composite
 from bt_actions.document.language.scalars import Flag
 from bt_actions.document.language.shapes import Key
-
-_MEMORY = Key(
-    "memory", Flag(), default="true",
-    doc="Whether a child that has finished is left alone; false makes the node reactive.",
-)  # fmt: skip
+from bt_actions.document.yaml.nodes import span_of
 
 
-def _build(node: TreeNode, _context: Context, *children: Behaviour) -> Behaviour:
-    both = py_trees.composites
-    make = both.Sequence if node.kind is KINDS[0] else both.Selector
+def _memory(more: str = "", word: str = "") -> Key:
+    return Key(
+        "memory", Flag(word=word), default="true",
+        doc="Whether a child that has finished is left alone; false makes the node "
+        f"reactive.{more}",
+    )  # fmt: skip
+
+
+def _sequence(node: TreeNode, context: Context, *children: Behaviour) -> Behaviour:
+    memory = node.values.get("memory", True)
+    if memory == "resume":
+        return composites.Resume(node.name, children)
+    make = leaving.Sequence if context.document.gated else py_trees.composites.Sequence
+    return make(node.name, memory is True, children=list(children))
+
+
+def _fallback(node: TreeNode, context: Context, *children: Behaviour) -> Behaviour:
+    if node.values.get("in_turn") is True:
+        return composites.InTurn(node.name, children)
+    make = leaving.Fallback if context.document.gated else py_trees.composites.Selector
     return make(node.name, node.values.get("memory", True) is True, children=list(children))
 
 
-def _all_succeed(_values: Settings, inner: list[Can], _at_once: bool) -> Can:
+def _check_turns(checker: Checker, node: TreeNode) -> None:
+    if node.values.get("in_turn") is True and node.values.get("memory") is False:
+        checker.source.report(
+            "BT110", span_of(node.written["memory"]),
+            "'in_turn' keeps its place while a child runs: nothing here is reactive",
+        )  # fmt: skip
+
+
+def all_succeed(_values: Settings, inner: list[Can], _at_once: bool) -> Can:
     passes, stops = True, False
     for passes, fails in inner:
         stops = stops or fails
@@ -28,24 +57,43 @@ def _all_succeed(_values: Settings, inner: list[Can], _at_once: bool) -> Can:
 
 def _all_fail(values: Settings, inner: list[Can], at_once: bool) -> Can:
     turned = [Can(end.fail, end.succeed) for end in inner]
-    return Can(*reversed(_all_succeed(values, turned, at_once)))
+    return Can(*reversed(all_succeed(values, turned, at_once)))
 
 
+_TURNS = """
+With `in_turn: true` a visit begins behind the child that has succeeded last, tries each child once,
+and goes on from the last to the first:
+
+| child | the node |
+|---|---|
+| SUCCESS | SUCCESS; the next visit begins behind this child |
+| FAILURE | tries the next child; after the last, FAILURE, and a visit begins at the first |
+| RUNNING | RUNNING |
+| stopped | the next visit begins at the first child |
+
+The place outlasts the end of a visit, as long as the tree is loaded.
+"""
+_RESUMES = """
+With `memory: resume` a visit that follows a failure, or a stop, begins with the child that failed
+or was stopped; after a success, with the first. Children that have finished are left alone.
+"""
 KINDS = (
     composite(
         "sequence",
         "Ticks its children in order until one fails; succeeds when all have.",
         "sequence: Fetch\nchildren:\n  - success: Go\n  - success: Grasp",
-        _MEMORY,
-        build=_build, ends=_all_succeed, goes_on=End.SUCCESS,
+        _memory(" resume goes on where the last visit failed.", "resume"),
+        build=_sequence, ends=all_succeed, goes_on=End.SUCCESS, semantics=_RESUMES,
         seconds=lambda _values, inner: sum(inner),
     ),
     composite(
         "fallback",
         "Ticks its children in order until one succeeds; fails when all have.",
         "fallback: Try both ways\nchildren:\n  - failure: Left\n  - success: Right",
-        _MEMORY,
-        build=_build, ends=_all_fail, goes_on=End.FAILURE,
-        seconds=lambda _values, inner: sum(inner),
+        _memory(),
+        Key("in_turn", Flag(), "Whether a visit begins behind the child that has succeeded last.",
+            default="false"),
+        build=_fallback, check=_check_turns, ends=_all_fail, goes_on=End.FAILURE,
+        semantics=_TURNS, seconds=lambda _values, inner: sum(inner),
     ),
 )  # fmt: skip

@@ -13,27 +13,43 @@ from bt_actions.document.yaml.nodes import span_of
 _POLICY = OneOf(
     Choice(("all", "one")),
     Record(
-        "{at_least: N}",
-        keyed(Key("at_least", Whole(1), "So many must succeed.", required=True, example="2")),
+        "{at_least: N, fails_after: N}",
+        keyed(
+            Key("at_least", Whole(1, word="all"), "So many must succeed.", default="all"),
+            Key(
+                "fails_after",
+                Whole(1),
+                "After so many failures the node fails at once.",
+                default="when too few can succeed",
+            ),
+        ),
     ),
 )
 
 
 def _build(node: TreeNode, _context: Context, *children: Behaviour) -> Behaviour:
     policy = node.values.get("policy")
-    needed = 1 if policy == "one" else table_of(policy).get("at_least")
-    return parallel.Parallel(node.name, children, at_least=needed)
+    numbers = table_of(policy)
+    needed = 1 if policy == "one" else numbers.get("at_least")
+    return parallel.Parallel(
+        node.name,
+        children,
+        at_least=None if needed == "all" else needed,
+        fails_after=numbers.get("fails_after"),
+    )
 
 
 def _check(checker: Checker, node: TreeNode) -> None:
-    least = table_of(node.values.get("policy")).get("at_least")
-    if isinstance(least, int) and least > len(node.children) > 0:
-        at = locate(node.written["policy"], ("at_least",))
-        text = f"{least} children can never succeed: there are {len(node.children)}"
-        checker.source.report("BT110", span_of(at), text)
+    numbers = table_of(node.values.get("policy"))
+    for key, end in (("at_least", "succeed"), ("fails_after", "fail")):
+        wanted = numbers.get(key)
+        if isinstance(wanted, int) and wanted > len(node.children) > 0:
+            at = locate(node.written["policy"], (key,))
+            text = f"{wanted} children can never {end}: there are {len(node.children)}"
+            checker.source.report("BT110", span_of(at), text)
 
 
-def _warn(hazards: Hazards, node: TreeNode, _bounded: bool) -> None:
+def warn_of_resources(hazards: Hazards, node: TreeNode, _bounded: bool) -> None:
     """Report two branches that need one resource: BT303."""
     taken: dict[str, TreeNode] = {}
     for child in node.children:
@@ -55,15 +71,24 @@ def _warn(hazards: Hazards, node: TreeNode, _bounded: bool) -> None:
 
 
 def _ends(values: Settings, inner: list[Can], _at_once: bool) -> Can:
-    enough = all if values.get("policy", "all") == "all" else any
+    policy = values.get("policy", "all")
+    everything = policy == "all" or (
+        isinstance(policy, dict) and policy.get("at_least", "all") == "all"
+    )
+    enough = all if everything else any
     return Can(enough(end.succeed for end in inner), any(end.fail for end in inner))
 
 
+_SEMANTICS = """
+`policy: {at_least: 2, fails_after: 1}` succeeds when two children have, and fails with the first
+that fails. Without `fails_after` the node fails when too few can succeed any more.
+"""
 KIND = composite(
     "parallel",
     "Ticks its children beside each other. A child that has finished is not started again; "
     "none is begun once the node has succeeded or failed, which is decided after each.",
     "parallel: Look and listen\nchildren:\n  - success: Look\n  - success: Listen",
     Key("policy", _POLICY, "How many must succeed; the rest is then stopped.", default="all"),
-    build=_build, check=_check, warn=_warn, ends=_ends, again=End.ANY,
+    build=_build, check=_check, warn=warn_of_resources, ends=_ends, again=End.ANY,
+    semantics=_SEMANTICS,
 )  # fmt: skip

@@ -1,12 +1,15 @@
 """`force_success` and `force_failure`: one end, however the child ends."""
 
-from bt_actions.document.kinds.given import Behaviour, Context, TreeNode, py_trees
+from bt_actions.document.kinds.given import Behaviour, Context, TreeNode, leaving, py_trees
 from bt_actions.document.language.kinds import Can, End, decorator
 
 
-def _build(node: TreeNode, _context: Context, child: Behaviour) -> Behaviour:
+def _build(node: TreeNode, context: Context, child: Behaviour) -> Behaviour:
+    succeeds = node.kind.name == "force_success"
+    if context.document.gated:
+        return (leaving.ForceSuccess if succeeds else leaving.ForceFailure)(node.name, child)
     both = py_trees.decorators
-    make = both.FailureIsSuccess if node.kind is KINDS[0] else both.SuccessIsFailure
+    make = both.FailureIsSuccess if succeeds else both.SuccessIsFailure
     return make(node.name, child)
 
 

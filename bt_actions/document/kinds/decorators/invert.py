@@ -1,12 +1,14 @@
 """`invert`: success where the child fails, and failure where it succeeds."""
 
-from bt_actions.document.kinds.given import Behaviour, Context, Hazards, TreeNode, py_trees
+from bt_actions.document.kinds.given import Behaviour, Context, Hazards, TreeNode, leaving, py_trees
 from bt_actions.document.language.kinds import Can, End, decorator
 from bt_actions.document.language.values import names_value
 from bt_actions.document.yaml.nodes import span_of
 
 
-def _build(node: TreeNode, _context: Context, child: Behaviour) -> Behaviour:
+def _build(node: TreeNode, context: Context, child: Behaviour) -> Behaviour:
+    if context.document.gated:
+        return leaving.Invert(node.name, child)
     return py_trees.decorators.Inverter(node.name, child)
 
 

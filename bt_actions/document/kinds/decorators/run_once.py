@@ -1,11 +1,13 @@
 """`run_once`: one visit of what it holds, whose end is kept."""
 
-from bt_actions.document.kinds.given import Behaviour, Context, TreeNode, py_trees
+from bt_actions.document.kinds.given import Behaviour, Context, TreeNode, leaving, py_trees
 from bt_actions.document.language.kinds import EITHER, End, decorator
 
 
-def _build(node: TreeNode, _context: Context, child: Behaviour) -> Behaviour:
+def _build(node: TreeNode, context: Context, child: Behaviour) -> Behaviour:
     policy = py_trees.common.OneShotPolicy.ON_COMPLETION
+    if context.document.gated:
+        return leaving.RunOnce(node.name, child, policy)
     return py_trees.decorators.OneShot(node.name, child, policy)
 
 

@@ -1,16 +1,16 @@
 """`action`: a goal, its type and server said in place or by a name under `actions`."""
 
 from bt_actions.document.kinds.given import Behaviour, Context, TreeNode, action, parts, reading
-from bt_actions.document.language.keys import ACTION_NAME, ACTION_TYPE, DOING
+from bt_actions.document.language.keys import ACTION_NAME, ACTION_TYPE, DOING, GATES
 from bt_actions.document.language.kinds import ACTION, leaf
 from bt_actions.document.language.scalars import NodeName
 from bt_actions.document.language.values import computed_in
-from bt_actions.document.reading.tree import settings_of
+from bt_actions.document.reading.tree import settings_of, text_of
 
 
 def _build(node: TreeNode, context: Context) -> Behaviour:
     settings = settings_of(node, context.document)
-    overrides_alias = len(node.values) - ("goal" in node.values) - ("save" in node.values) > 1
+    overrides_alias = not node.values.keys() <= {node.key.text, *_OWN}
     shared = None if overrides_alias else context.shared.get(node.alias)
     if shared is None:
         shared = {
@@ -26,10 +26,13 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
         node.name,
         goal=context.value(goal) if computed_in(goal) else goal,
         save=context.saved(settings.get("save"), reading.of_result, result),
+        on_change=text_of(settings, "on_change") or "ignore",
         **shared,
     )
 
 
+_OWN = ("goal", "save", *GATES)
+"""What a node of an action may have, and share the rest with others of the action."""
 KIND = leaf(
     "action",
     NodeName(),

@@ -8,7 +8,7 @@ from bt_actions.document.findings import Related
 from bt_actions.document.kinds.given import Behaviour, Checker, Context, build, decorators
 from bt_actions.document.language.keys import NAMESPACE
 from bt_actions.document.language.kinds import Can, Settings, leaf
-from bt_actions.document.language.scalars import Name, Text
+from bt_actions.document.language.scalars import Choice, Name, Text
 from bt_actions.document.language.shapes import Key, Table, Values
 from bt_actions.document.language.types import Record, fits, misfits
 from bt_actions.document.language.values import Computed, computed_in, refuse_large
@@ -23,6 +23,7 @@ from bt_actions.document.reading.tree import (
 )
 from bt_actions.document.yaml.nodes import Mapping, Node, span_of
 from bt_actions.messages.fields import FieldType
+from bt_actions.utilities.plain_data import same
 from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean, listing
 
@@ -36,6 +37,7 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
         included, scope, namespace=namespace, types=context.types, python=context.python
     )
     given = context.value(node.values.get("with", {}))
+    passed: dict[str, object] = {}
     saved = table_of(node.values.get("save"))
     written = {declared.name for declared in included.outputs.values()}
     written |= _writes(included, included.nodes())
@@ -43,7 +45,7 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
         if inner.kind.once:
             written -= _writes(included, inner.walk())  # which is not done again
 
-    def begin() -> None:
+    def inputs() -> dict[str, object]:
         values = given()
         if not isinstance(values, dict):
             got = shorten(values, 60)
@@ -52,11 +54,21 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
             refuse_large(values)
         except ValueError as error:
             raise ValueError(f"'with': {error}") from None
-        inputs = check_inputs(included, values, types=context.types)
+        return check_inputs(included, values, types=context.types)
+
+    def begin() -> None:
+        passed.update(values := inputs())
         for name in written:
-            if name not in inputs:
+            if name not in values:
                 scope.clear(name)
-        scope.write_all(inputs)
+        scope.write_all(values)
+
+    def pass_on() -> None:
+        with contextlib.suppress(ValueError):  # what was passed before stays
+            now = inputs()
+            changed = {name: now[name] for name in now if not same(passed.get(name), now[name])}
+            passed.update(changed)
+            scope.write_all(changed)
 
     def end() -> None:
         values = {}
@@ -65,7 +77,9 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
                 values[name] = scope.read(output)
         context.write(values)
 
-    return decorators.Subtree(node.name or included.name, child, begin, end)
+    passes = node.values.get("on_change") == "pass"
+    name = node.name or included.name
+    return decorators.Subtree(name, child, begin, end, pass_on if passes else None)
 
 
 def _writes(document: Document, nodes: Iterable[TreeNode]) -> set[str]:
@@ -170,6 +184,9 @@ KIND = leaf(
     "Another tree: it sees only what `with` passes, and gives back outputs by `save`.",
     "subtree: recover\nwith: {home: 0.0}",
     Key("with", Values(), "Values for the tree's inputs."),
+    Key("on_change", Choice(("ignore", "pass")),
+        "Whether inputs that are others than before are passed on while the tree runs.",
+        default="ignore"),
     Key("save", Table(Name()), "Names here for the tree's outputs."),
     Key("namespace", NAMESPACE, "Put before all relative names of the tree."),
     reads="with",

@@ -1,0 +1,90 @@
+"""`only_if` and `only_while` of any node: conditions under which a node is there at all.
+
+A gate is a part of its node, not another one: what is RUNNING, and was only asked as it began, is
+ticked as without a gate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from bt_actions.behaviours.asking import still_ends
+from bt_actions.behaviours.leaving import leave_out
+
+Condition = Callable[[], str]
+"""Says why a node is left out; "" where it is not. Raises ValueError, which fails the node."""
+
+
+def gate(behaviour: Behaviour, words: Mapping[str, str], **conditions: Condition) -> None:
+    """Have a behaviour be left out where a condition does not hold.
+
+    Of the conditions `only_if` is asked as a visit begins, `only_while` before each tick. A
+    behaviour that runs is stopped, and is RUNNING until the goals below it have ended. `words` say
+    the conditions, for those who show the node.
+    """
+    _Gate(behaviour, conditions.get("only_if"), conditions.get("only_while"))
+    behaviour.gates = dict(words)  # type: ignore[attr-defined]
+
+
+class _Gate:
+    def __init__(
+        self, behaviour: Behaviour, only_if: Condition | None, only_while: Condition | None
+    ) -> None:
+        self._node, self._if, self._while = behaviour, only_if, only_while
+        self._tick = behaviour.tick
+        self._asks = getattr(behaviour, "asks", lambda: False)
+        self._why = ""
+        """Why the node was stopped, and is to be left out."""
+        self._error = ""
+        """Why it was stopped, and is to fail."""
+        behaviour.left_out = False  # type: ignore[attr-defined]
+        behaviour.asks = self.asks  # type: ignore[attr-defined]
+        behaviour.tick = self.tick  # type: ignore[method-assign]
+
+    def asks(self) -> bool:
+        """Return whether something is asked at each tick."""
+        left_out: bool = self._node.left_out  # type: ignore[attr-defined]
+        return self._while is not None or left_out or self._asks()
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Tick the behaviour; without another level of generators where nothing is to be asked."""
+        if self._while is None and self._node.status is Status.RUNNING:
+            return self._tick()
+        return self._asked()
+
+    def _asked(self) -> Iterator[Behaviour]:
+        node = self._node
+        begins = node.status is not Status.RUNNING
+        if begins:
+            node.left_out = node.refused = False  # type: ignore[attr-defined]
+            self._why = self._error = ""
+        if not (self._why or self._error):
+            self._ask(begins)
+        if not (self._why or self._error):
+            yield from self._tick()
+            return
+        if node.status is not Status.INVALID:
+            node.stop(Status.INVALID)
+        if waits_for := still_ends(node):
+            node.feedback_message, node.status = (
+                f"{self._why or self._error}; {waits_for}",
+                Status.RUNNING,
+            )
+        elif self._error:
+            node.feedback_message, node.status = self._error, Status.FAILURE
+            node.refused = True  # type: ignore[attr-defined]
+        else:
+            node.status = leave_out(node, self._why)
+        yield node
+
+    def _ask(self, begins: bool) -> None:
+        try:
+            if begins and self._if is not None:
+                self._why = self._if()
+            if not self._why and self._while is not None:
+                self._why = self._while()
+        except ValueError as error:
+            self._error = str(error)
