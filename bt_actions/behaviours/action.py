@@ -9,7 +9,7 @@ it goes out, and an answer comes back, is told at the head of traffic/__init__.p
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import is_not
 from typing import TYPE_CHECKING, Any
 
@@ -17,9 +17,10 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from bt_actions.behaviours.connected import Connected
+from bt_actions.behaviours.following import ON_CHANGE, Following
 from bt_actions.behaviours.places import root_of
 from bt_actions.behaviours.reading import Reading
-from bt_actions.behaviours.variables import reads_variables, resolve
+from bt_actions.behaviours.variables import reads_variables
 from bt_actions.events.kinds import AttemptEnded
 from bt_actions.events.snapshot import HIDDEN
 from bt_actions.events.teller import current_teller
@@ -55,7 +56,7 @@ class Progress:
     """The field of Timeouts that `seconds_left` belongs to, or ``backoff``."""
 
 
-class ActionBehaviour(Connected["Endpoint"], Behaviour):
+class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
     """Sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
 
     While it runs, `feedback_message` has the goal's state and its latest feedback in short form.
@@ -77,6 +78,10 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         busy: what to do when the resources are taken: wait, replace, fail or share.
         resources: what the goal occupies, in place of the action server; named as servers are, so
             a relative name is expanded with the node's namespace.
+        on_change: what to do where the goal's fields, computed anew at each tick, differ from what
+            was sent, while that executes: ignore it, `replace` the goal by another one at once, or
+            `cancel` it, and send another one when it has ended. The leaf stays RUNNING, and only
+            the end of the newest goal counts; `timeout.result` runs on, and no attempt is used.
         on_feedback: called with each feedback message, on the ticking thread, before the outcome
             is seen; of those that come between two ticks, or while it runs, the newest 100.
 
@@ -99,9 +104,12 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         save: Mapping[str, str | Callable[[Any], Any]] | None = None,
         busy: Busy | str = "wait",
         resources: Iterable[str] | None = None,
+        on_change: str = "ignore",
         on_feedback: Callable[[Any], None] | None = None,
     ) -> None:
         super().__init__(name)
+        if on_change not in ON_CHANGE:
+            raise ValueError(f"on_change is one of {', '.join(ON_CHANGE)}, not {on_change!r}")
         if isinstance(resources, str):
             raise ValueError("resources must be a collection of names, not one text")
         self.action_type = action_type
@@ -111,6 +119,9 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         self.retry = Retry.of(retry)
         self.busy = Busy(busy)
         self.resources = frozenset(resources or ())
+        self.on_change = on_change
+        if on_change != "ignore":
+            self.asks = lambda: True  # at each tick what would be sent now
         self.on_feedback = on_feedback
         self.expect = expect
         self.save = dict(save or {})
@@ -251,8 +262,16 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
             if self._is_over():
                 return Status.FAILURE
             if not decided:
+                if self.on_change != "ignore" and self._is_outdated(handle, backend):
+                    handle = self._follow(handle, backend)
+                    continue
                 self.feedback_message = self._in_words(handle)
                 return Status.RUNNING
+            if self._renews and handle.goal.end is not End.UNKNOWN:
+                handle.goal.forget_message()
+                handle = self._send(backend, self._result_left)
+                continue
+            self._let_go_of_older(handle, backend)
             record = self._judge(handle, backend)
             again = not self._is_over() and self._attempts.again(record, backend.randomness)
             self._tell(record, self._attempts.pause_left(backend.now()) if again else None)
@@ -267,6 +286,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         if backend is None or handle is None:
             return
         if not self._is_recorded(handle):
+            self._let_go_of_older(handle, backend)
             backend.traffic.interrupt(handle)
             outcome, reason = handle.goal.outcome, handle.goal.reason
             if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
@@ -329,13 +349,20 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
     # Within
 
     def _begin(self, backend: Backend) -> GoalHandle:
+        """Begin an attempt."""
+        return self._send(backend, self.timeouts.result)
+
+    def _send(self, backend: Backend, result: float | None, busy: Busy | None = None) -> GoalHandle:
+        """Begin a goal, whose result is due so many seconds after it is accepted."""
+        self._renews = False
         self._left_behind = self.open_handles()
+        timeouts = self.timeouts
         self._handle = backend.traffic.begin(
             self._own,
             self,
-            self.timeouts,
+            timeouts if result == timeouts.result else replace(timeouts, result=result),
             self.resources,
-            self.busy,
+            busy or self.busy,
             attempt=self._attempts.attempt,
             keeps_feedback=self.on_feedback is not None,
             accounts_for_all=self.settles,
@@ -362,7 +389,7 @@ class ActionBehaviour(Connected["Endpoint"], Behaviour):
         if teller is not None:
             teller.reads_secret = False  # whatever was read of the attempt before
         try:
-            data = resolve(self.goal() if callable(self.goal) else self.goal)
+            data = self._sent = self._data()
             return fill(action.Goal, data, now=self._connection()[0].stamp)
         finally:
             reads = teller is not None and teller.reads_secret

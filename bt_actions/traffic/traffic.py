@@ -196,6 +196,12 @@ class Traffic:
         with self.host.lock:
             return handle.goal.deadline(now)
 
+    def result_due_in(self, handle: GoalHandle) -> float | None:
+        """Return the seconds until the result of a goal that executes is due; None: no deadline."""
+        with self.host.lock:
+            left = handle.goal.deadlines.left(self.participant.now())
+        return next((max(s, 1e-3) for s, event in left if event is Event.RESULT_DUE), None)
+
     def interrupt(self, handle: GoalHandle) -> None:
         """The tree no longer wants it. Returns at once; the goal is drained."""
         tell(handle, Event.INTERRUPTED)

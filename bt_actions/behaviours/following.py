@@ -1,0 +1,87 @@
+"""Goals that follow what they are made from: what of an action's leaf sends another one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from bt_actions.behaviours.variables import resolve
+from bt_actions.goals.policy import Busy
+from bt_actions.goals.terms import State
+from bt_actions.messages.conversion import fill
+from bt_actions.utilities.plain_data import same
+
+if TYPE_CHECKING:
+    from bt_actions.traffic.backend import Backend
+    from bt_actions.traffic.state import GoalHandle
+
+ON_CHANGE = ("ignore", "replace", "cancel")
+
+
+class Following:
+    """Compares at each tick what would be sent now with what was sent.
+
+    Besides the newest goal of a leaf runs one at most, which that is to replace: a change that
+    comes meanwhile waits, and the newest one counts.
+    """
+
+    action_type: Any
+    goal: Any
+    on_change: str
+    open_handles: Callable[[], list[GoalHandle]]
+    _send: Callable[..., GoalHandle]
+    _sent: object = None
+    """What the newest goal was made from."""
+    _renews = False
+    """Whether another goal is to follow when this one, which is canceled, has ended."""
+    _result_left: float | None = None
+    """The seconds that it has then for its result."""
+
+    def _data(self) -> object:
+        """Compute what a goal is made from."""
+        return resolve(self.goal() if callable(self.goal) else self.goal)
+
+    def _is_outdated(self, newest: GoalHandle, backend: Backend) -> bool:
+        """Return whether another goal is to be sent now in the place of one that executes.
+
+        While the one has to end that this has replaced, another one is to follow this one's end.
+        """
+        if newest.goal.state is not State.EXECUTING:
+            return False
+        is_outdated = self._differs()
+        others = (each for each in self.open_handles() if each is not newest)
+        if not any(not each.is_decided for each in others):
+            return is_outdated
+        self._renews = is_outdated
+        if is_outdated:
+            self._result_left = backend.traffic.result_due_in(newest)
+        return False
+
+    def _differs(self) -> bool:
+        """Return whether what would be sent now is another goal than was sent, and can be sent."""
+        try:
+            data = self._data()
+            if same(data, self._sent):
+                return False
+            # at one moment, so that a stamp of `now` is no difference
+            one, other = (
+                fill(self.action_type.Goal, each, now=lambda: 0) for each in (data, self._sent)
+            )
+            return bool(one != other)
+        except Exception:  # noqa: BLE001 - the user's: any; what was sent runs on
+            return False
+
+    def _follow(self, newest: GoalHandle, backend: Backend) -> GoalHandle:
+        """Send a goal in the place of one that is outdated, or cancel that one first."""
+        left = backend.traffic.result_due_in(newest)
+        if self.on_change == "replace":
+            return self._send(backend, left, Busy.REPLACE)
+        self._renews, self._result_left = True, left
+        backend.traffic.interrupt(newest)
+        return newest
+
+    def _let_go_of_older(self, newest: GoalHandle, backend: Backend) -> None:
+        """Interrupt a goal that the newest one was to replace, and has not."""
+        for handle in self.open_handles():
+            if handle is not newest and handle.goal.state is State.EXECUTING:
+                backend.traffic.interrupt(handle)
