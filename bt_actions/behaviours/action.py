@@ -19,7 +19,7 @@ from py_trees.common import Status
 from bt_actions.behaviours.connected import Connected
 from bt_actions.behaviours.following import ON_CHANGE, Following
 from bt_actions.behaviours.places import root_of
-from bt_actions.behaviours.reading import Reading
+from bt_actions.behaviours.reading import Reading, of_failure, of_feedback
 from bt_actions.behaviours.variables import reads_variables
 from bt_actions.events.kinds import AttemptEnded
 from bt_actions.events.snapshot import HIDDEN
@@ -75,9 +75,14 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         save: blackboard keys, and what each is set to on success: an expression as for `expect`
             (``{"final_pose": "result.final_pose"}``), or a function of the result. Raising
             ValueError makes the result an unexpected one.
+        save_on_failure: as `save`, of a visit that fails; `outcome` says why. What a failure does
+            not have keeps its value, which is that of an empty result as a visit begins.
         busy: what to do when the resources are taken: wait, replace, fail or share.
         resources: what the goal occupies, in place of the action server; named as servers are, so
             a relative name is expanded with the node's namespace.
+        until: a condition on each feedback message, as `expect` is on the result: where it holds,
+            the goal is canceled, and the leaf succeeds when that has been canceled, or has
+            succeeded; `expect` is not asked then. However else it ends, there is no other attempt.
         on_change: what to do where the goal's fields, computed anew at each tick, differ from what
             was sent, while that executes: ignore it, `replace` the goal by another one at once, or
             `cancel` it, and send another one when it has ended. The leaf stays RUNNING, and only
@@ -102,6 +107,8 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         retry: Retry | int = 1,
         expect: Callable[[Any], bool] | str | None = None,
         save: Mapping[str, str | Callable[[Any], Any]] | None = None,
+        save_on_failure: Mapping[str, str | Callable[[Any], Any]] | None = None,
+        until: Callable[[Any], bool] | str | None = None,
         busy: Busy | str = "wait",
         resources: Iterable[str] | None = None,
         on_change: str = "ignore",
@@ -125,6 +132,12 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         self.on_feedback = on_feedback
         self.expect = expect
         self.save = dict(save or {})
+        self._of_failure = None
+        if save_on_failure:
+            self._of_failure = Reading(None, save_on_failure, names=of_failure)
+        self._until = None
+        if until is not None:
+            self._until = Reading(until, {}, names=of_feedback, what="feedback")
         self._reading = Reading(expect, self.save, self.retry.when, self.names)
         self._shown: tuple[tuple[Any, Any, Any], str] = (None, None, None), ""
         self._handle: GoalHandle | None = None
@@ -222,8 +235,11 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
                 fill(action.Goal, self.goal)
             except MessageError as error:
                 raise ValueError(f"{self.name}: goal: {error}") from error
-        if wrong := self._reading.set_up(action.Result):
-            raise ValueError(f"{self.name}: {wrong}")
+        for each in (self._reading, self._of_failure):
+            if each is not None and (wrong := each.set_up(action.Result)):
+                raise ValueError(f"{self.name}: {wrong}")
+        if self._of_failure is not None:
+            self._of_failure.save((action.Result(), ""))
         self.action_type = action
         super().setup(**kwargs)
 
@@ -236,6 +252,9 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         ActionBehaviour.terminate(self, Status.INVALID)  # where the first tick of a visit broke off
         self._attempts = Attempts(self.retry, self._reading.when)
         self._outcome = None
+        self._is_enough = False
+        if self._of_failure is not None:
+            self._of_failure.save((self.action_type.Result(), ""))
         self._begin(backend)
 
     def update(self) -> Status:
@@ -259,6 +278,9 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
                 message = handle.feedback.popleft()
                 if self.on_feedback is not None and not self._is_over():
                     self.on_feedback(message)
+                if self._until is not None and not (decided or self._until.read(message)):
+                    self._is_enough = True
+                    backend.traffic.interrupt(handle)
             if self._is_over():
                 return Status.FAILURE
             if not decided:
@@ -267,13 +289,17 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
                     continue
                 self.feedback_message = self._in_words(handle)
                 return Status.RUNNING
-            if self._renews and handle.goal.end is not End.UNKNOWN:
+            if self._renews and not self._is_enough and handle.goal.end is not End.UNKNOWN:
                 handle.goal.forget_message()
                 handle = self._send(backend, self._result_left)
                 continue
             self._let_go_of_older(handle, backend)
             record = self._judge(handle, backend)
-            again = not self._is_over() and self._attempts.again(record, backend.randomness)
+            again = (
+                not self._is_over()
+                and not self._is_enough
+                and self._attempts.again(record, backend.randomness)
+            )
             self._tell(record, self._attempts.pause_left(backend.now()) if again else None)
             if self._is_over():
                 return Status.FAILURE
@@ -364,7 +390,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
             self.resources,
             busy or self.busy,
             attempt=self._attempts.attempt,
-            keeps_feedback=self.on_feedback is not None,
+            keeps_feedback=self.on_feedback is not None or self._until is not None,
             accounts_for_all=self.settles,
         )
         return self._handle
@@ -400,7 +426,11 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         goal = handle.goal
         outcome, reason = goal.outcome, goal.reason
         assert outcome is not None
-        if outcome is Outcome.SUCCEEDED:
+        if self._is_enough and goal.end in (End.CANCELED, End.SUCCEEDED):
+            if goal.end is End.SUCCEEDED:
+                self._reading.save(goal.result)
+            outcome, reason = Outcome.SUCCEEDED, "its feedback was enough"
+        elif outcome is Outcome.SUCCEEDED:
             if why := self._read_result(goal.result):
                 outcome, reason = Outcome.UNEXPECTED_RESULT, why + goal.blamed
         elif more := self.explain(outcome, goal.result):
@@ -439,6 +469,8 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
 
     def _finish(self, record: AttemptRecord) -> Status:
         self._outcome = record.outcome
+        if self._of_failure is not None and record.outcome is not Outcome.SUCCEEDED:
+            self._of_failure.save((record.result, str(record.outcome)))
         number = record.attempt
         tries = f" (attempt {number} of {self.retry.attempts})" if number > 1 else ""
         told = f": {record.reason}" if record.reason else ""

@@ -7,6 +7,7 @@ functions of it; as text, ``$x`` in them is a variable, and ``result`` what the 
 from __future__ import annotations
 
 import ast
+import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +28,19 @@ Given = Callable[[Any], Any] | str
 def of_result(result: Any) -> Mapping[str, object]:
     """What most expressions may name."""
     return {"result": result}
+
+
+def of_feedback(feedback: Any) -> Mapping[str, object]:
+    """What expressions over feedback may name."""
+    return {"feedback": feedback}
+
+
+def of_failure(given: Any) -> Mapping[str, object]:
+    """What expressions over a failure may name, of a result (None where there was none) and why."""
+    if given is None:
+        return {"result": None, "outcome": None}
+    result, outcome = given
+    return {"outcome": outcome} if result is None else {"result": result, "outcome": outcome}
 
 
 @dataclass(slots=True, eq=False)
@@ -115,6 +129,14 @@ class Reading:
                             hint = did_you_mean(name, result_type.get_fields_and_field_types())
                             return f"{what}: result has no field {name!r}{hint}"
         return ""
+
+    def save(self, result: Any) -> None:
+        """Save what of it can be: a place that is not in it keeps what it had."""
+        saved = {}
+        for name, value in self._save.items():
+            with contextlib.suppress(ValueError):
+                saved[name] = value(result)
+        write(saved)
 
     def seen(self, result: Any) -> dict[str, object]:
         """What stood for the names in `expect`, where the result that was read last is not as

@@ -31,6 +31,8 @@ class TopicValue(Connected[Subscription]):
         self.name = name
         self._given = message_type, topic, qos
         self._max_age = max_age
+        self.default: Callable[[], object] | None = None
+        """Gives what is read before the first message, and when the last is too old."""
         self._look_again_at = 0.0
         self._newest: tuple[Any, Stopwatch] | None = None
         """The latest message, and how old it is on the node's clock."""
@@ -51,7 +53,18 @@ class TopicValue(Connected[Subscription]):
         return backend.subscription(interface(message_type, "msg"), topic, qos, take)
 
     def read(self) -> object:
-        """Return the latest message. Raises ExpressionError where it is missing or too old."""
+        """Return the latest message, or the default, where it is missing or too old.
+
+        Raises ExpressionError where there is no default.
+        """
+        if self.default is None:
+            return self._latest()
+        try:
+            return self._latest()
+        except ExpressionError:
+            return self.default()
+
+    def _latest(self) -> object:
         if self._backend is None:
             raise ExpressionError(f"nothing has come on {self._given[1]} yet (${self.name})")
         topic = self._own.name
@@ -68,6 +81,8 @@ class TopicValue(Connected[Subscription]):
 
     def first_may_come(self) -> float:
         """Return the seconds for which the first message may be on its way; 0 afterwards."""
+        if self.default is not None:
+            return 0.0
         return 0.0 if self._own is None or self._newest else float(self._own.may_come())
 
 

@@ -11,8 +11,10 @@ from py_trees.common import Status
 from robot_control_interfaces.action import MoveRobot
 from std_msgs.msg import Bool
 
+from bt_actions import Outcome
 from bt_actions.behaviours.composites import If, Recover
 from bt_actions.behaviours.leaving import Invert, Sequence
+from bt_actions.document import tree_outputs
 from bt_actions.events import GoalChanged, NodeChanged
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
 
@@ -257,3 +259,88 @@ def test_a_subtree_hands_changed_inputs_on_while_it_runs(
         runner = VirtualRunner(root, network)
         assert runner.run() is Status.SUCCESS
         assert sent(runner) == wanted
+
+
+def test_what_a_failure_tells_is_zero_before_and_kept_where_nothing_came(
+    load: Load, network: VirtualNetwork
+) -> None:
+    ScriptedServer(network, MoveRobot, "codes", faults=["codes:1:abort", "codes:2:reject"])
+    root = load("""
+tree: t
+outputs: {before: int32, code: int32, why: string, then: string, at_last: string}
+actions:
+  move: {type: robot_control_interfaces/action/MoveRobot, server: codes, timeout: 30 s,
+         save_on_failure: {code: result.status, why: outcome}}
+root:
+  sequence: S
+  children:
+    - set: {before: = $code}
+    - {force_success: F, child: {move: First}}
+    - set: {then: $why}
+    - {force_success: F, child: {move: Second}}
+    - set: {at_last: $why}
+    - move: Third
+""")
+    assert VirtualRunner(root, network).run() is Status.SUCCESS
+    told = tree_outputs(root)
+    assert told == {"before": 0, "code": 0, "then": "ABORTED", "at_last": "REJECTED", "why": ""}
+
+
+UNTIL = (
+    HEAD
+    + """  lift: Up
+  goal: {distance: 4.0}
+  expect: "false"
+  until: feedback.current_pose > 1.0
+  retry: 3
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("faults", "status", "outcome"),
+    [
+        ([], Status.SUCCESS, Outcome.SUCCEEDED),
+        (["lift:*:succeed_on_cancel"], Status.SUCCESS, Outcome.SUCCEEDED),
+        (["lift:*:abort_on_cancel"], Status.FAILURE, Outcome.CANCELED),
+    ],
+)
+def test_feedback_that_is_enough_ends_a_goal_and_is_a_success(
+    load: Load, faults: list[str], status: Status, outcome: Outcome
+) -> None:
+    network = VirtualNetwork()
+    script = Script(
+        duration=4.0, feedback=lambda goal, done: MoveRobot.Feedback(current_pose=4.0 * done)
+    )
+    ScriptedServer(network, MoveRobot, "lift", script, faults=faults)
+    runner = VirtualRunner(load(UNTIL), network)
+    assert runner.run() is status
+    assert runner.outcomes == [("Up", outcome)]
+    assert 1.0 < runner.now < 2.0
+
+
+def test_a_topic_with_a_default_has_a_value_from_the_beginning(
+    load: Load, network: VirtualNetwork
+) -> None:
+    root = load("""
+tree: t
+inputs: {start: {type: std_msgs/msg/Bool, default: {data: true}}}
+outputs: {first: bool, second: bool, third: bool}
+topics:
+  near: {topic: near, type: std_msgs/msg/Bool, max_age: 1 s, default: $start}
+  far: {topic: far, type: std_msgs/msg/Bool, default: {data: true}}
+root:
+  sequence: S
+  children:
+    - set: {first: $near.data, third: $far.data}
+    - wait: 1 s
+    - set: {second: $near.data}
+    - wait: 2 s
+    - check: $near.data
+""")
+    runner = VirtualRunner(root, network)
+    runner.start()
+    runner.advance(0.5)
+    network.publish("near", Bool(data=False))
+    assert runner.run() is Status.SUCCESS
+    assert tree_outputs(root) == {"first": True, "second": False, "third": True}

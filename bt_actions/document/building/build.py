@@ -47,6 +47,9 @@ def build(
     inner = join_names(namespace, document.namespace)
     topics = {declared.name: _topic(declared, inner) for declared in document.topics.values()}
     context = Context(document, scope, inner, types, topics, python, once)
+    for name, declared in document.topics.items():
+        if "default" in declared.values:
+            topics[name].default = context.default(declared)
     root = _node(document.root, context)
     if topics:
         _connect(root, list(topics.values()))

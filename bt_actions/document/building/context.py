@@ -24,9 +24,16 @@ from bt_actions.behaviours.topics import TopicValue
 from bt_actions.behaviours.variables import hide, is_hidden, unhide, value_of, write
 from bt_actions.document.language.classes import Python
 from bt_actions.document.language.types import parse_type
-from bt_actions.document.language.values import Computed, refuse_large, resolve
+from bt_actions.document.language.values import Computed, computed_in, refuse_large, resolve
 from bt_actions.document.reading.inputs import convert
-from bt_actions.document.reading.tree import Document, TreeNode, join_names, table_of, text_of
+from bt_actions.document.reading.tree import (
+    Declared,
+    Document,
+    TreeNode,
+    join_names,
+    table_of,
+    text_of,
+)
 from bt_actions.document.yaml.nodes import Scalar
 from bt_actions.expressions.expression import Expression
 from bt_actions.messages import fields
@@ -177,6 +184,15 @@ class Context:
     def joined(self, values: Mapping[str, object], name: str) -> str:
         """A name in the namespaces that hold here."""
         return join_names(self.namespace, text_of(values, "namespace"), name)
+
+    def default(self, topic: Declared) -> Callable[[], object]:
+        """The default of a topic as a function, which raises ValueError."""
+        kind, written = str(topic.values["type"]), topic.values["default"]
+        if computed_in(written):
+            compute = self.value(written)
+            return lambda: convert(compute(), kind, types=self.types)
+        message = convert(written, kind, types=self.types)
+        return lambda: message
 
     def value(self, written: object) -> Callable[[], object]:
         """A function that computes a value as it stands in the document."""

@@ -91,6 +91,10 @@ def _check_declarations(checker: Checker) -> None:
         default = declared.values.get("default", BAD)
         if default is not BAD:
             _check_default(checker, declared, default)
+    for declared in document.topics.values():
+        if "default" in declared.values and declared.source is checker.source:
+            kind = checker.variables.get(declared.name)
+            checker.value(kind, declared.values["default"], declared.written("default"))
 
 
 def _declared_type(checker: Checker, declared: Declared, *, topic: bool) -> FieldType | None:

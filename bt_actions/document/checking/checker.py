@@ -44,7 +44,16 @@ from bt_actions.document.language.values import (
     names_file,
 )
 from bt_actions.document.reading.inputs import refuse_infinite
-from bt_actions.document.reading.tree import Declared, Document, TreeNode, Write, when_of, writes_of
+from bt_actions.document.reading.tree import (
+    SAVES,
+    Declared,
+    Document,
+    TreeNode,
+    Write,
+    table_of,
+    when_of,
+    writes_of,
+)
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.mistaken import warn_bare_angle, warn_bare_duration
 from bt_actions.document.yaml.nodes import Node, Scalar, span_of
@@ -243,13 +252,21 @@ class Checker:
         asked, roots = _parts(cls, interface)
         if key in values and key in written:
             self.value(asked, values[key], written[key])
-        self.condition(values.get("expect", values.get("until")), roots)
+        self.condition(values.get("expect"), roots)
+        if interface.kind == "action":
+            roots_of_feedback = {"feedback": None if cls is None else Message(cls.Feedback)}  # type: ignore[attr-defined]
+            self.condition(values.get("until"), roots_of_feedback)
+        else:
+            self.condition(values.get("until"), roots)
         if "retry" in values:
             self.condition(when_of(values), roots)
-        saved = values.get("save")
-        for name, place in saved.items() if isinstance(saved, dict) else ():
-            if isinstance(place, Computed):
-                self.assigns(name, self.expression(place, roots), place.node)
+        for key, more in zip(SAVES, ({}, {"outcome": TEXT}), strict=True):
+            for name, place in table_of(values.get(key)).items():
+                if isinstance(place, Computed):
+                    self.assigns(name, self.expression(place, {**roots, **more}), place.node)
+        for name in table_of(values.get(SAVES[0])).keys() & table_of(values.get(SAVES[1])).keys():
+            text = f"{name!r} is saved of a success, too: nobody could tell which it is of"
+            self.source.report("BT216", span_of(written[SAVES[1]]), text)
 
     def assigns(self, name: str, kind: FieldType | None, node: Node) -> None:
         """Check that a value of a type may be written to a variable."""

@@ -17,6 +17,7 @@ from bt_actions.document.language.keys import GATES
 from bt_actions.document.language.kinds import Can, End, Group
 from bt_actions.document.language.values import Computed, computed_in
 from bt_actions.document.reading.tree import (
+    SAVES,
     Declared,
     Document,
     TreeNode,
@@ -255,7 +256,7 @@ class Hazards:
             if not unread:
                 continue
             node = unread[0].node
-            tables = (node.written.get("set"), node.written.get("save"))
+            tables = [node.written.get(key) for key in ("set", *SAVES)]
             pairs = (pair for one in tables if isinstance(one, YamlMapping) for pair in one.pairs)
             keys = {key.text: key for key, _ in pairs}
             for name in (one.name for one in unread if not doubts.mentions(one.name)):

@@ -23,7 +23,7 @@ from bt_actions.document.checking.checker import Checker
 from bt_actions.document.findings import Related, Span
 from bt_actions.document.language.kinds import End, Kind
 from bt_actions.document.language.values import Computed, computed_in
-from bt_actions.document.reading.tree import TreeNode, settings_of
+from bt_actions.document.reading.tree import TreeNode, always_there, settings_of
 from bt_actions.document.yaml.nodes import span_of
 
 _NOTHING: frozenset[str] = frozenset()
@@ -47,7 +47,8 @@ class _Order:
     def __init__(self, checker: Checker) -> None:
         self._checker = checker
         self._doubts = checker.doubts
-        self._known = {*checker.document.inputs, *checker.document.topics}
+        document = checker.document
+        self._known = {*document.inputs, *document.topics, *always_there(document)}
         """What may have been written when the node is reached that is visited now."""
         self._passed: set[str] = set()
         """What the nodes write that were visited already."""
@@ -188,7 +189,7 @@ class _Missing:
         self._known: dict[int, _Needs] = {}
         self._written: set[str] = set()
         """What nodes write that come before the one that is visited now."""
-        self._there = set(checker.document.inputs)
+        self._there = {*checker.document.inputs, *always_there(checker.document)}
         """What has a value whenever that node is reached."""
 
     def visit(self, node: TreeNode) -> None:
@@ -229,9 +230,10 @@ class _Missing:
         if name in self._there or self._doubts.mentions(name):
             return False
         checker = self._checker
-        return name in checker.document.topics or (
-            name in checker.variables and name not in self._written
-        )
+        topic = checker.document.topics.get(name)
+        if topic is not None:
+            return "default" not in topic.values
+        return name in checker.variables and name not in self._written
 
     def _needs(self, node: TreeNode) -> _Needs:
         found = self._known.get(id(node))

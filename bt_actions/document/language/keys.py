@@ -79,14 +79,22 @@ POLICIES = (
     Key("busy", Choice(tuple(busy.value for busy in Busy)), "What to do while the server is taken.",
         default="wait"),
 )  # fmt: skip
+FAILED = frozenset({"result", "outcome"})
+SAVE_ON_FAILURE = Key(
+    "save_on_failure", Table(Place(FAILED)),
+    "Names to keep parts of a result under that is none of a success, or the `outcome`.",
+)  # fmt: skip
 DOING = (
     Key("goal", Values(), "The fields of the goal; what is not named keeps its default."),
+    Key("until", Condition(frozenset({"feedback"})),
+        "Where this holds for the feedback, the goal is canceled, and that is a success."),
     Key("on_change", Choice(("ignore", "replace", "cancel")),
         "What to do where the fields are others than were sent, while the goal executes.",
         default="ignore"),
     *POLICIES,
     Key("expect", Condition(RESULT), "What the result must be, beyond the server's word."),
     Key("save", Table(Place(RESULT)), "Names to keep parts of the result under."),
+    SAVE_ON_FAILURE,
     Key("resources", ListOf(Text("a text")),
         "What the goal occupies, in place of its server; named as servers are.",
         default="the server's name"),
@@ -147,6 +155,7 @@ TOPIC = Record(
         Key("qos", QOS, "How it is subscribed to.", default="default"),
         Key("max_age", Duration(or_none=True), default="none",
             doc="A value older than this, by the node's clock, counts as missing."),
+        Key("default", AnyValue(), "What is read where there is no value; no node waits for one."),
         Key("namespace", NAMESPACE, "Put before a relative topic name."),
     ),
 )  # fmt: skip

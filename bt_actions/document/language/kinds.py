@@ -190,7 +190,9 @@ NODE_KEYS = {*ACTION_KEYS, "child", "children"}
 
 Other keys that hold nodes may: beside a kind that has such a key, the word is that key.
 """
-SINCE = dict.fromkeys(("if", "pipeline", "every", "in_turn", "on_change", *GATES), "0.2")
+SINCE = dict.fromkeys(
+    ("if", "pipeline", "every", "in_turn", "on_change", "save_on_failure", *GATES), "0.2"
+)
 """The version of bt_actions since which a word may name no action, where not from the beginning."""
 
 

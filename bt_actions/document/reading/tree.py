@@ -198,6 +198,8 @@ def when_of(settings: object) -> object:
     return retry.get("when") if isinstance(retry, dict) else None
 
 
+SAVES = ("save", "save_on_failure")
+"""The keys whose names an action's nodes write."""
 _Known = dict[tuple[int, str], dict[str, TreeNode]]
 
 
@@ -257,8 +259,19 @@ def writes_of(node: TreeNode, document: Document) -> list[Write]:
     if "save" not in kind.keys:
         return []
     declared = document.actions.get(node.alias) if node.alias is not None else None
-    own, shared = table_of(values.get("save")), table_of(declared and declared.values.get("save"))
     root = interface.root if interface is not None else None
-    given = [pair for pair in shared.items() if pair[0] not in own]
-    writes = [Write(name, node, "", value, "result") for name, value in given]
-    return writes + [Write(name, node, "save", value, root) for name, value in own.items()]
+    writes = []
+    for key in SAVES:
+        own, shared = table_of(values.get(key)), table_of(declared and declared.values.get(key))
+        given = [pair for pair in shared.items() if pair[0] not in own]
+        writes += [Write(name, node, "", value, "result") for name, value in given]
+        writes += [Write(name, node, key, value, root) for name, value in own.items()]
+    return writes
+
+
+def always_there(document: Document) -> set[str]:
+    """The variables that have a value from the beginning, though no one gives it: zero."""
+    tables = (
+        settings_of(node, document).get(SAVES[1]) for node in document.nodes() if node.is_action
+    )
+    return {name for table in tables for name in table_of(table)}

@@ -18,12 +18,14 @@ def _warn(hazards: Hazards, node: TreeNode, _bounded: bool) -> None:
     kinds = {inner.kind for inner in asked}
     if not all(kind.in_turn or (kind.only_asks and not kind.slow) for kind in kinds):
         return
+    topics = hazards.document.topics.items()
+    silent = {name for name, topic in topics if "default" not in topic.values}
     reads = (read for inner in asked for read in hazards.checker.reads.get(id(inner), ()))
     of_topics = (
         (name, read)
         for read in reads
         for name in read.expression.variables
-        if name in hazards.document.topics and name not in read.expression.asked
+        if name in silent and name not in read.expression.asked
     )
     topic, first = next(of_topics, ("", None))
     if first is None or hazards.doubts.below(node):

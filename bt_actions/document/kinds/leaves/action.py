@@ -5,7 +5,7 @@ from bt_actions.document.language.keys import ACTION_NAME, ACTION_TYPE, DOING, G
 from bt_actions.document.language.kinds import ACTION, leaf
 from bt_actions.document.language.scalars import NodeName
 from bt_actions.document.language.values import computed_in
-from bt_actions.document.reading.tree import settings_of, text_of
+from bt_actions.document.reading.tree import SAVES, settings_of, text_of
 
 
 def _build(node: TreeNode, context: Context) -> Behaviour:
@@ -17,6 +17,7 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
             "action_type": parts.interface_in(settings, "action", context),
             "action_name": context.name(settings, "server"),
             **parts.goal_settings(settings, context, reading.of_result),
+            "until": context.condition(settings.get("until"), reading.of_feedback),
         }
         if not overrides_alias:
             context.shared[node.alias] = shared
@@ -26,12 +27,13 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
         node.name,
         goal=context.value(goal) if computed_in(goal) else goal,
         save=context.saved(settings.get("save"), reading.of_result, result),
+        save_on_failure=context.saved(settings.get("save_on_failure"), reading.of_failure),
         on_change=text_of(settings, "on_change") or "ignore",
         **shared,
     )
 
 
-_OWN = ("goal", "save", *GATES)
+_OWN = ("goal", *SAVES, *GATES)
 """What a node of an action may have, and share the rest with others of the action."""
 KIND = leaf(
     "action",
