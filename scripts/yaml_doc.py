@@ -207,7 +207,11 @@ DEFAULTS = """\
 node's own, the action's under `actions`, the tree's `defaults`, those that it imports."""
 NAMESPACE = """\
 Names of actions, services and topics are relative where they begin without a slash. Before one go
-the namespaces of the node, of the trees and subtrees around it, and its own."""
+the namespaces of the node, of the trees and subtrees around it, and its own.
+
+`$(robot)` in a name, or in a namespace, is an input of type string: `server: $(robot)/move`. It has
+to be known before the tree runs: an input of the tree that is run, or of a subtree whose `with`
+gives a constant or such an input."""
 LEFT_OUT = """\
 Both may stand beside any kind. A node is left out where `only_if` is false as it begins, where
 `only_while` is false before a tick (what runs below is stopped, and the node is `RUNNING` until the

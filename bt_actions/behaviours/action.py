@@ -295,11 +295,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
                 continue
             self._let_go_of_older(handle, backend)
             record = self._judge(handle, backend)
-            again = (
-                not self._is_over()
-                and not self._is_enough
-                and self._attempts.again(record, backend.randomness)
-            )
+            again = not self._is_over() and self._attempts.again(record, backend.randomness)
             self._tell(record, self._attempts.pause_left(backend.now()) if again else None)
             if self._is_over():
                 return Status.FAILURE

@@ -132,7 +132,9 @@ class Tree:
         scope.write_all(values)
         with self._workspace.as_it_was():
             try:
-                root = build(document, scope, types=types, python=self._python, once=once)
+                root = build(
+                    document, scope, types=types, python=self._python, once=once, static=values
+                )
             except TooManyErrors:
                 raise DocumentError(_errors(self._workspace)) from None
             _refuse(self._workspace)  # a class of one's own may fail when it is made

@@ -11,10 +11,10 @@ from py_trees.common import Status
 from robot_control_interfaces.action import MoveRobot
 from std_msgs.msg import Bool
 
-from bt_actions import Outcome
+from bt_actions import ActionBehaviour, Outcome
 from bt_actions.behaviours.composites import If, Recover
 from bt_actions.behaviours.leaving import Invert, Sequence
-from bt_actions.document import tree_outputs
+from bt_actions.document import DocumentError, InputError, tree_outputs
 from bt_actions.events import GoalChanged, NodeChanged
 from bt_actions.testing import Script, ScriptedServer, VirtualNetwork, VirtualRunner
 
@@ -344,3 +344,46 @@ root:
     network.publish("near", Bool(data=False))
     assert runner.run() is Status.SUCCESS
     assert tree_outputs(root) == {"first": True, "second": False, "third": True}
+
+
+INNER = """
+tree: inner
+inputs: {who: string, at: {type: string, default: near}}
+topics: {near: {topic: $(at), type: std_msgs/msg/Bool, default: {data: true}}}
+root:
+  action: Go
+  type: robot_control_interfaces/action/MoveRobot
+  server: $(who)/move
+  timeout: 3 s
+  only_if: $near.data
+"""
+OUTER = """
+tree: outer
+inputs: {{robot: {{type: string, default: r1}}}}
+root:
+  sequence: S
+  children:
+    - {{subtree: inner, with: {{who: r2}}}}
+    - {{subtree: inner, with: {{who: {who}}}, namespace: $(robot)}}
+"""
+
+
+def servers(root: Behaviour) -> list[str]:
+    return [node.action_name for node in root.iterate() if isinstance(node, ActionBehaviour)]
+
+
+def test_inputs_are_put_into_names_all_the_way_down(load: Load) -> None:
+    assert servers(load(OUTER.format(who="$robot"), inner=INNER)) == ["r2/move", "r1/r1/move"]
+    root = load(OUTER.format(who="$(robot)b"), {"robot": "/a"}, inner=INNER)
+    assert servers(root) == ["r2/move", "/ab/move"]
+
+
+def test_a_name_that_ros_refuses_is_refused_with_the_input_that_makes_it(load: Load) -> None:
+    with pytest.raises(InputError, match=r"\$\(robot\) would be 'no name', as robot is 'no name'"):
+        load(OUTER.format(who="$robot"), {"robot": "no name"}, inner=INNER)
+
+
+def test_what_a_subtree_needs_before_it_runs_is_no_variable(load: Load) -> None:
+    text = OUTER.format(who="$said").replace("children:", "children:\n    - set: {said: r1}")
+    with pytest.raises(DocumentError, match=r"\$said is no input"):
+        load(text, inner=INNER)

@@ -140,6 +140,9 @@ def test_a_name_in_an_expression_is_the_trees_own(
     for step in where[:-1]:
         place = place.setdefault(step, {})
     place[where[-1]] = written(shape, place.get(where[-1]))
+    if where[0] == "topics":
+        place |= {"topic": "got", "type": "std_msgs/msg/Int32", "default": {"data": "$order"}}
+        document["root"] = {"check": "$got.data == 5"}
     if where[-1] in GATES:
         place[where[-1]] = "$order == 6"  # and what it leaves out succeeds at the root
     if where[-1] == "when":  # which is asked after an attempt that failed

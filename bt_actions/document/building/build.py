@@ -5,13 +5,15 @@ The kinds of the nodes build the behaviours. Only documents without errors come 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from py_trees.behaviour import Behaviour
 
 from bt_actions.behaviours.gates import gate
 from bt_actions.behaviours.topics import TopicValue, patient
-from bt_actions.document.building.context import Context, Scope
+from bt_actions.document.building.context import Context, Scope, filled
 from bt_actions.document.findings import NODE
 from bt_actions.document.language.classes import Python
 from bt_actions.document.language.keys import GATES
@@ -35,18 +37,21 @@ def build(
     types: bool = True,
     python: Python = True,
     once: bool = False,
+    static: Mapping[str, object] = MappingProxyType({}),
 ) -> Behaviour:
     """The behaviours of a document; each has its node.
 
-    With `once` no more will be made of it: its YAML is let go of on the way. What cannot be made is
+    `static` are its inputs as far as they are known, which the names of servers may hold. With
+    `once` no more will be made of it: its YAML is let go of on the way. What cannot be made is
     reported to the document's source, as is every ``python:`` node that `python` does not allow.
-    Raises TooManyErrors.
+    Raises TooManyErrors, and InputError for a name that an input makes none.
     """
     assert document.root is not None
     scope.hide(name for name, each in inputs_of(document).items() if each.secret)
-    inner = join_names(namespace, document.namespace)
-    topics = {declared.name: _topic(declared, inner) for declared in document.topics.values()}
-    context = Context(document, scope, inner, types, topics, python, once)
+    inner = join_names(namespace, filled(document.namespace, static))
+    topics: dict[str, TopicValue] = {}
+    context = Context(document, scope, inner, types, topics, python, once, static)
+    topics |= {each.name: _topic(each, context) for each in document.topics.values()}
     for name, declared in document.topics.items():
         if "default" in declared.values:
             topics[name].default = context.default(declared)
@@ -56,9 +61,9 @@ def build(
     return root
 
 
-def _topic(declared: Declared, namespace: str) -> TopicValue:
+def _topic(declared: Declared, context: Context) -> TopicValue:
     values: dict[str, Any] = declared.values
-    name = join_names(namespace, text_of(values, "namespace"), text_of(values, "topic"))
+    name = context.name(values, "topic")
     qos = text_of(values, "qos") or "default"
     return TopicValue(declared.name, values["type"], name, qos, values.get("max_age"))
 

@@ -23,9 +23,10 @@ from bt_actions.behaviours.reading import Formula, Names
 from bt_actions.behaviours.topics import TopicValue
 from bt_actions.behaviours.variables import hide, is_hidden, unhide, value_of, write
 from bt_actions.document.language.classes import Python
+from bt_actions.document.language.ros_names import INPUT, why_not
 from bt_actions.document.language.types import parse_type
 from bt_actions.document.language.values import Computed, computed_in, refuse_large, resolve
-from bt_actions.document.reading.inputs import convert
+from bt_actions.document.reading.inputs import InputError, convert
 from bt_actions.document.reading.tree import (
     Declared,
     Document,
@@ -146,6 +147,8 @@ class Context:
     python: Python = True
     """Which ``python:`` nodes may be made."""
     once: bool = False
+    static: Mapping[str, object] = field(default_factory=dict)
+    """The inputs whose values are known before the tree runs, for the names of servers."""
     shared: dict[str | None, dict[str, Any]] = field(default_factory=dict)
     """By actions: what their nodes have in common that say but a goal and a `save` of their own."""
 
@@ -181,9 +184,13 @@ class Context:
         """A ROS name in the namespaces that hold here."""
         return self.joined(values, text_of(values, key))
 
+    def namespace_of(self, values: Mapping[str, object]) -> str:
+        """The namespaces that hold below a node."""
+        return join_names(self.namespace, filled(text_of(values, "namespace"), self.static))
+
     def joined(self, values: Mapping[str, object], name: str) -> str:
         """A name in the namespaces that hold here."""
-        return join_names(self.namespace, text_of(values, "namespace"), name)
+        return join_names(self.namespace_of(values), filled(name, self.static))
 
     def default(self, topic: Declared) -> Callable[[], object]:
         """The default of a topic as a function, which raises ValueError."""
@@ -286,6 +293,20 @@ def _numbers(
         return None
     fits = declared is None or parse_type(declared) == kind
     return attrgetter(".".join(path)) if fits else None
+
+
+def filled(name: str, inputs: Mapping[str, object]) -> str:
+    """A ROS name with what inputs put into it. Raises InputError for one that ROS refuses."""
+    found = INPUT.findall(name)
+    if not found:
+        return name
+    if missing := [each for each in found if each not in inputs]:
+        raise InputError(f"{name}: {missing[0]!r} is not known before the tree runs")
+    made = INPUT.sub(lambda each: str(inputs[each[1]]), name)
+    if why := why_not(made.rstrip("/")):
+        given = ", ".join(f"{each} is {inputs[each]!r}" for each in found)
+        raise InputError(f"{name} would be {made!r}, as {given}: {why}")
+    return made
 
 
 def plain_name(text: str) -> str:

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.names import check_names
+from bt_actions.document.checking.server_names import check_server_names
 from bt_actions.document.checking.value_types import FLOAT, INTEGER
 from bt_actions.document.findings import Related
 from bt_actions.document.language.keys import GATES
@@ -46,6 +47,7 @@ def check_document(checker: Checker) -> None:
             _check_together(checker, node)
     _check_defaults(checker)
     check_names(checker)
+    check_server_names(checker)
 
 
 def _check_form(checker: Checker, node: TreeNode) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from bt_actions.document.checking.checker import Checker
 from bt_actions.document.checking.reads import find_early_reads, find_missing
+from bt_actions.document.checking.server_names import inputs_in_names
 from bt_actions.document.checking.verdicts import Verdicts
 from bt_actions.document.findings import Related
 from bt_actions.document.language.keys import GATES
@@ -226,6 +227,7 @@ class Hazards:
         checker, document, doubts = self.checker, self.document, self.doubts
         reads = itertools.chain.from_iterable(checker.reads.values())
         read = {name for one in reads for name in one.expression.variables}
+        read |= inputs_in_names(document)
         written = {write.name for writes in checker.writes.values() for write in writes}
         if not doubts.unknown_variable:
             self._unread(read, written)

@@ -23,13 +23,18 @@ _PART = r"(?:[A-Za-z0-9_]|\{(?:node|ns|namespace)\})"
 _TOKEN = rf"(?![0-9]){_PART}+"
 _NAME = rf"(?:~|(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*)"
 _NAMESPACE = rf"(?:{_NAME})?/?"
+INPUT = re.compile(r"\$\(([A-Za-z][A-Za-z0-9_]*)\)")
+"""An input in a name."""
 _STRANGE = re.compile(r"[^A-Za-z0-9_/~{}]")
 _BRACES = re.compile(r"\{[^{}]*\}?|\}")
 
 
 @dataclass(frozen=True, slots=True)
 class RosName:
-    """A name that ROS takes; a `namespace` may be empty, and end with a slash."""
+    """A name that ROS takes; a `namespace` may be empty, and end with a slash.
+
+    Inputs of the tree may stand in it as `$(name)`: they are put in when a tree is made.
+    """
 
     words: str
     namespace: bool = False
@@ -37,16 +42,18 @@ class RosName:
     def read(self, node: Node, source: Source) -> object:
         if not isinstance(node, Scalar) or not isinstance(node.value, str):
             return wrong_form(self, node, source)
-        if re.fullmatch(self._pattern, node.text) and len(node.text) <= self._longest:
+        written = INPUT.sub("x", node.text)
+        if re.fullmatch(self._pattern, written) and len(written) <= self._longest:
             warn_cut(node, source, "text")
             return node.text
         hint = "letters, digits and underscores between slashes, such as arm/gripper"
-        said = f"{node.text!r} cannot be {self.words}: {_why(node.text, self._longest)}"
+        said = f"{node.text!r} cannot be {self.words}: {_why(written, self._longest)}"
         source.report("BT121", span_of(node), said, hint=hint)
         return BAD
 
     def schema(self) -> Schema:
-        return {"type": "string", "pattern": f"^{self._pattern}$", "maxLength": self._longest}
+        names = {"pattern": f"^{self._pattern}$", "maxLength": self._longest}
+        return {"type": "string", "anyOf": [names, {"pattern": INPUT.pattern}]}
 
     @property
     def _pattern(self) -> str:
@@ -69,7 +76,7 @@ def _why(text: str, longest: int) -> str:
     if len(text) > longest:
         return f"it has more than {longest} characters"
     if "$" in text:
-        return "no variable can stand in it"
+        return "an input stands in it as $(name)"
     strange = _STRANGE.search(text)
     if strange is not None:
         return "a space cannot stand in it" if strange[0] == " " else f"{strange[0]!r} is in it"

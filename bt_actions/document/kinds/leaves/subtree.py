@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Container, Iterable
+from collections.abc import Mapping as Mapped
 
 from bt_actions.document.checking.value_types import named
 from bt_actions.document.findings import Related
@@ -11,14 +12,12 @@ from bt_actions.document.language.kinds import Can, Settings, leaf
 from bt_actions.document.language.scalars import Choice, Name, Text
 from bt_actions.document.language.shapes import Key, Table, Values
 from bt_actions.document.language.types import Record, fits, misfits
-from bt_actions.document.language.values import Computed, computed_in, refuse_large
+from bt_actions.document.language.values import Computed, computed_in, refuse_large, resolve
 from bt_actions.document.reading.inputs import check_inputs
 from bt_actions.document.reading.tree import (
     Document,
     TreeNode,
-    join_names,
     table_of,
-    text_of,
     writes_of,
 )
 from bt_actions.document.yaml.nodes import Mapping, Node, span_of
@@ -32,9 +31,13 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
     included = node.included
     assert included is not None
     scope = context.scope.inner(included.name)
-    namespace = join_names(context.namespace, text_of(node.values, "namespace"))
     child = build.build(
-        included, scope, namespace=namespace, types=context.types, python=context.python
+        included,
+        scope,
+        namespace=context.namespace_of(node.values),
+        types=context.types,
+        python=context.python,
+        static=_static(node, included, context.static),
     )
     given = context.value(node.values.get("with", {}))
     passed: dict[str, object] = {}
@@ -80,6 +83,19 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
     passes = node.values.get("on_change") == "pass"
     name = node.name or included.name
     return decorators.Subtree(name, child, begin, end, pass_on if passes else None)
+
+
+def _static(node: TreeNode, included: Document, outer: Mapped[str, object]) -> dict[str, object]:
+    """The inputs of an included tree that are known before it runs, from those of this one."""
+    inputs = included.inputs.items()
+    found = {name: each.values["default"] for name, each in inputs if "default" in each.values}
+    for name, value in table_of(node.values.get("with")).items():
+        found.pop(name, None)
+        read = {each for one in computed_in(value) for each in one.expression.variables}
+        if read <= outer.keys():
+            with contextlib.suppress(ValueError):  # told where it is begun
+                found[name] = resolve(value, outer.__getitem__)
+    return found
 
 
 def _writes(document: Document, nodes: Iterable[TreeNode]) -> set[str]:
