@@ -54,11 +54,13 @@ def _parallel(given: Given) -> Node:
                 return wanted if wanted >= 0 else number + wanted + 1
         return default if default >= 0 else number + default + 1
 
-    succeeds = counted("success_count", "success_threshold", "threshold", default=-1)
+    names = ("success_count", "success_threshold", "threshold")
+    succeeds = counted(*names, default=-1)
+    skips = all(given.element.attributes.get(name, "-1") == "-1" for name in names)
     fails = counted("failure_count", "failure_threshold", default=1)
     policy: dict[str, object] = {}
-    if 0 < succeeds < number:
-        policy["at_least"] = succeeds
+    if 0 < succeeds < number or (succeeds == number and not skips):  # a child that is left out
+        policy["at_least"] = succeeds  # counts for -1 alone
     if 0 < fails < number - succeeds + 1:
         policy["fails_after"] = fails
     node = Node(parallel=given.name())
@@ -243,6 +245,8 @@ def _set(given: Given) -> Node:
 
 def _for_each(given: Given) -> Node:
     empty = given.text("if_empty", "SUCCESS")
+    if empty == "SKIPPED":
+        raise Refused("if_empty")
     name = variable_in(given.text("value"), "value")
     if name is None:
         raise Refused("port", "'value' names no variable")
@@ -256,8 +260,6 @@ def _for_each(given: Given) -> Node:
                  "child": given.only_child()})  # fmt: skip
     if empty == "FAILURE":
         return Node(force_failure=given.name(), child=node)
-    if empty == "SKIPPED":
-        node["only_if"] = f"len({items}) > 0"
     return node
 
 

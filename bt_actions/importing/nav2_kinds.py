@@ -9,7 +9,6 @@ from bt_actions.importing.report import Verdict
 from bt_actions.importing.scripts import Refused
 from bt_actions.importing.text import Node
 
-_PACED = ("PipelineSequence", "Repeat", "KeepRunningUntilFailure")
 _AT_ONCE = ("check", "set", "log", "success", "failure", "publish")
 
 
@@ -45,7 +44,7 @@ def _pipeline(given: Given) -> Node:
 def _rate(given: Given) -> Node:
     text = given.text("hz", "10.0")
     child = given.only_child()
-    if given.around not in _PACED:
+    if given.around != "PipelineSequence":
         given.converted("hz", "only in a pipeline does it keep to a rate, there as well")
         given.differs("dropped: its parent begins it anew at each tick, so that it paces nothing")
         return child
