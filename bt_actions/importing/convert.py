@@ -78,7 +78,7 @@ def convert(paths: list[Path], mapping: Map | None = None) -> Imported:
             continue
         begun.append(definition)
         writer = Writer(project, definition, KINDS, call)
-        tree = writer.tree(names[definition.name])
+        tree = writer.tree(names[definition.name], called=definition.name in called)
         text = document(tree, tree.comments)
         name = f"{names[definition.name]}.yaml"
         imported.files[name] = format_source(Source(name, text))

@@ -238,8 +238,11 @@ def _set(given: Given) -> Node:
     text = given.text("value")
     value: object = given.reference("value")
     if value is None:
-        kind = given.writer.project.sorts[name].value
-        value = value_of(text, kind or "string")
+        project = given.writer.project
+        known = project.types.get(name, "")
+        value = value_of(
+            text, known if known.endswith("]") else project.sorts[name].value or "string"
+        )
     return given.named(Node(set={given.scope[name]: value}))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from bt_actions.importing.given import Given
 from bt_actions.importing.mapping import SAVES, Leaf
-from bt_actions.importing.names import value_of
+from bt_actions.importing.names import ros_name, value_of
 from bt_actions.importing.project import ports_of, variable_in
 from bt_actions.importing.scripts import Refused
 from bt_actions.importing.text import Node
@@ -54,7 +54,9 @@ class _Filled:
         self._declare(kind, node)
         for key, each in rest.items():
             filled = self._saves(each) if key in SAVES else self._fill(each)
-            if filled is not _MISSING and filled != {}:
+            if key in ("server", "topic"):
+                node[key] = ros_name("" if filled is _MISSING else filled)
+            elif filled is not _MISSING and filled != {}:
                 node[key] = filled
         for port in self._texts:
             given.dropped(port, "the map has no place for it")
@@ -68,12 +70,11 @@ class _Filled:
                 writer.imports.add(mapping.imports[word][0])
             elif (section := mapping.section_of(word)) is not None:
                 writer.words.setdefault(section, {})[word] = mapping.words[section][word]
-        server = self._texts.pop("server_name", None)
-        if server is None or kind not in mapping.imports:
+        server = self._port("server_name")
+        if server is _MISSING or kind not in mapping.imports:
             return
-        self._given.converted("server_name")
         node["action"] = node.pop(kind)
-        node["type"], node["server"] = mapping.imports[kind][1], server
+        node["type"], node["server"] = mapping.imports[kind][1], ros_name(server)
 
     def _port(self, port: str) -> object:
         """The value of a port, `$name` for a variable, or _MISSING."""
@@ -117,6 +118,8 @@ class _Filled:
                 return found
             if isinstance(found, str) and found.startswith("$"):
                 return found if whole[2] == " s" else f"= {found} / 1000"
+            if not isinstance(found, int | float):
+                raise Refused("port", f"{whole[1]} is no number")
             return f"{found:g}{whole[2]}" if isinstance(found, float) else f"{found}{whole[2]}"
         return self._in_expression(value)
 

@@ -11,6 +11,7 @@ from bt_actions.importing.scripts import Refused
 from bt_actions.importing.text import Node
 
 _LONGEST_NAME = 120
+_ROS_NAME = r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*"
 
 
 def identifier(text: str) -> str:
@@ -33,6 +34,15 @@ def node_name(text: str) -> str:
     """Return a text that can be the name of a node."""
     name = "".join(char if char.isprintable() and char not in ":$#" else " " for char in text)
     return " ".join(name.split())[:_LONGEST_NAME] or "unnamed"
+
+
+def ros_name(value: object) -> str:
+    """Return what is a name of ROS, or a variable that holds one. Raises Refused."""
+    if isinstance(value, str) and re.fullmatch(r"\$[A-Za-z]\w*", value, re.ASCII):
+        return f"$({value[1:]})"
+    if not isinstance(value, str) or not re.fullmatch(_ROS_NAME, value, re.ASCII):
+        raise Refused("port", f"{value!r} is no name of a server or a topic")
+    return value
 
 
 def in_sequence(name: str, nodes: list[Node], kind: str = "sequence") -> Node:

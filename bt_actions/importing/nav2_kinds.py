@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bt_actions.importing.given import Given, Handler
-from bt_actions.importing.names import milliseconds
+from bt_actions.importing.names import milliseconds, ros_name
 from bt_actions.importing.project import SELECTORS, variable_in
 from bt_actions.importing.report import Verdict
 from bt_actions.importing.scripts import Refused
@@ -31,7 +31,8 @@ def _recovery(given: Given) -> Node:
 
 
 def _pipeline(given: Given) -> Node:
-    *before, last = [each for each in given.children() if not each.dropped] or given.children()
+    children = given.children()
+    *before, last = [each for each in children if not each.dropped] or children
     bare = [
         Node(every="none", child=each) if takes_time(each) else each for each in before
     ]  # a node that was written keeps its result there, as long as the pipeline runs
@@ -83,7 +84,7 @@ def _selector(given: Given) -> Node:
         raise Refused("port", f"{output} names no variable")
     default = given.text(f"default_{what}", "")
     topic = {
-        "topic": given.text("topic_name", f"{what}_selector"),
+        "topic": ros_name(given.text("topic_name", f"{what}_selector")),
         "type": "std_msgs/msg/String",
         "qos": "latched",
         "default": {"data": default},
@@ -103,7 +104,7 @@ def _goal_updater(given: Given) -> Node:
     for each in ("input_goals", "output_goals"):
         given.dropped(each, "one goal is taken over")
     given.writer.words["topics"][given.scope[name]] = {
-        "topic": given.text("goal_updater_topic", "goal_update"),
+        "topic": ros_name(given.text("goal_updater_topic", "goal_update")),
         "type": "geometry_msgs/msg/PoseStamped",
         "default": goal,
     }

@@ -75,6 +75,8 @@ class Definition:
     accesses: dict[str, str] = field(default_factory=dict)
     """By variable: `r`, `w`, `rw` or `wr`, what is done first standing first."""
     done: bool = False
+    outputs: set[str] | None = None
+    """What callers get, when it was asked for."""
 
     @property
     def root(self) -> Element | None:
@@ -242,6 +244,23 @@ class Project:
                 if other and other not in self.types:
                     self.types[other] = kind
                     waiting.append((other, kind))
+
+    def outputs(self, tree: Definition) -> set[str]:
+        """Return the variables of a tree that its callers get."""
+        if tree.outputs is None:
+            calls = (
+                element
+                for definition in self.trees.values()
+                for element in definition.element.walk()
+                if kind_of(element) in SUBTREES and element.attributes.get("ID") == tree.name
+            )
+            tree.outputs = {
+                name
+                for element in calls
+                for name in tree.accesses
+                if tree.writes(name) and outer_name(element, tree, name) is not None
+            }
+        return tree.outputs
 
     def reaches(self, definition: Definition, other: Definition) -> bool:
         """Return whether a tree is another one, or holds it."""

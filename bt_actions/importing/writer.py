@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from bt_actions.importing.given import Given, Handler
+from bt_actions.importing.mapping import SAVES, texts_in
 from bt_actions.importing.names import (
     Scope,
     identifier,
@@ -38,6 +39,8 @@ from bt_actions.importing.saying import asked, assignments
 from bt_actions.importing.scripts import Refused, ScriptError
 from bt_actions.importing.text import Node
 
+_NOTHING = {"string": "", "bool": False, "float64": 0.0, "int64": 0, "uint16": 0}
+"""By type: what a variable holds that nothing wrote; a message its defaults."""
 _PACING = ("RateController", "GoalUpdatedController")
 """What means something to the pipeline around it alone."""
 _CONCURRENT = re.compile(r"Parallel|Reactive|Pipeline|WhileDoElse|Switch|Timeout|NonblockingSeq")
@@ -61,14 +64,12 @@ class Writer:
         self.imports: set[str] = set()
         self.stubs: dict[str, set[str]] = {}
         """The classes that are to be written, with their arguments."""
-        self.inputs: dict[str, str] = {}
-        """By our name: the name in the XML."""
         self._inside: list[Definition] = [definition]
 
     # The tree
 
-    def tree(self, name: str) -> Node:
-        """Write the tree, as a document."""
+    def tree(self, name: str, *, called: bool) -> Node:
+        """Write the tree, as a document; `called` where another tree holds it."""
         element, scope = self.definition.element, self.scope(self.definition)
         if self.definition.root is None:
             refused = Refused("children", f"it has {len(element.children)} nodes, not one")
@@ -87,10 +88,10 @@ class Writer:
             self.report.attribute(element, "_description", Verdict.CONVERTED)
         if self.imports:
             tree["import"] = sorted(self.imports)
-        inputs, both = {}, {}
-        outputs = {
-            scope[each]: self.project.type_of(each) for each in self.outputs(self.definition)
-        }
+        inputs: dict[str, object] = {}
+        both: dict[str, object] = {}
+        given_back = self.project.outputs(self.definition)
+        outputs = {scope[each]: self.project.type_of(each) for each in given_back}
         for each in self.definition.accesses:
             if not self.definition.reads_first(each) or each in scope.topics:
                 continue
@@ -101,6 +102,14 @@ class Writer:
             if not self.project.knows(each):
                 why = f"nothing tells the type of the input {each}: it was written as a text"
                 self.report.tree(element, self.definition.name, Verdict.DIFFERS, why)
+        types = {scope[each]: self.project.type_of(each) for each in self.definition.accesses}
+        for name in sorted(_read_only(root) - {*inputs, *both, *self.words["topics"]}):
+            kind = types.get(name, "string")  # what would have written it was not imported
+            nothing = _NOTHING.get(kind, {})
+            if name in outputs:
+                both[name] = nothing
+            else:
+                inputs[name] = {"type": kind, "default": nothing} if called else kind
         if both:
             root = Node(sequence="With what was given", children=[Node(set=both), root])
         for key, declared in (("inputs", inputs), ("outputs", outputs)):
@@ -111,19 +120,6 @@ class Writer:
                 tree[section] = dict(sorted(words.items()))
         tree["root"] = root
         return tree
-
-    def outputs(self, tree: Definition) -> set[str]:
-        """Return the variables that callers get from a tree."""
-        wanted: set[str] = set()
-        for definition in self.project.trees.values():
-            for element in definition.element.walk():
-                if kind_of(element) in SUBTREES and (element.attributes.get("ID") == tree.name):
-                    wanted |= {
-                        name
-                        for name in tree.accesses
-                        if tree.writes(name) and outer_name(element, tree, name) is not None
-                    }
-        return wanted
 
     def scope(self, definition: Definition, prefix: str = "", outer: Any = None) -> Scope:
         """Return the names of a tree."""
@@ -259,7 +255,7 @@ class Writer:
         for each in sorted(inner.accesses):
             outer = outer_name(element, inner, each)
             if inner.reads_first(each):
-                name = input_name(each, taken=each in self.outputs(inner))
+                name = input_name(each, taken=each in self.project.outputs(inner))
                 values[name] = self._passed(given, inner, each, outer)
             if inner.writes(each) and outer is not None:
                 saved[given.scope[outer]] = identifier(each)
@@ -325,6 +321,24 @@ class Writer:
         finally:
             self._inside.pop()
         return in_sequence(given.name(inner.name), [*before, node]) if before else node
+
+
+def _read_only(root: Node) -> set[str]:
+    """Return the variables of a tree that no node of it writes."""
+    texts = " ".join(texts_in(root))
+    read = {*re.findall(r"(?<!\$)\$\(?([A-Za-z]\w*)", texts)}
+    return read - {*_written(root)}
+
+
+def _written(node: Node) -> Iterator[str]:
+    for key, value in node.items():
+        if key in SAVES and isinstance(value, dict):
+            yield from value
+        elif key == "as":
+            yield str(value)
+        for inner in value if isinstance(value, list) else [value]:
+            if isinstance(inner, Node):
+                yield from _written(inner)
 
 
 def _lines(comments: list[str]) -> list[str]:
