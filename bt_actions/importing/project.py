@@ -225,7 +225,8 @@ class Project:
             if kind in SUBTREES and name is None and not text.startswith("json:"):
                 self.sorts.add_text(port, text)
             if name is not None and kind in LOOPS and port == "value":
-                self.sorts.use(name, Sort.TEXT if kind == "LoopString" else Sort.NUMBER)
+                sorts = {"LoopString": Sort.TEXT, "LoopBool": Sort.TRUTH}
+                self.sorts.use(name, sorts.get(kind, Sort.NUMBER))
             if name is not None and kind_of_port:
                 self.types.setdefault(name, kind_of_port)
                 if (sort := _sort_of(kind_of_port)) is not None:
