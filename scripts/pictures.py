@@ -21,7 +21,10 @@ from bt_actions.render import dot
 from bt_actions.render.graphviz import draw
 
 ROOT = Path(__file__).resolve().parent.parent
-PICTURES = {ROOT / "docs/images/pick_and_place.svg": ROOT / "trees/pick_and_place.yaml"}
+PICTURES = {
+    ROOT / "docs/images/first_tree.svg": ROOT / "examples/first/first.yaml",
+    ROOT / "docs/images/pick_and_place.svg": ROOT / "trees/pick_and_place.yaml",
+}
 """Each picture, and the tree that it shows."""
 
 _PLACED = {"cx", "cy", "d", "height", "points", "rx", "ry", "transform", "viewBox", "width"}

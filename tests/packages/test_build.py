@@ -20,6 +20,7 @@ from zipfile import ZipFile
 import pytest
 
 from tests.packages.conftest import Write
+from tests.support.environments import HIDDEN, copy_environment
 
 DATA = Path(__file__).with_name("data")
 PATIENCE = 900.0
@@ -73,10 +74,9 @@ class Environment:
     def __init__(self, prefix: Path) -> None:
         self.prefix = prefix
         self.python = prefix / "bin" / "python"
-        hidden = ("LD_LIBRARY_PATH", "PYTHONPATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE")
         self.before: set[str] = set()
         self.before = {f"{name}-{version}" for name, version in self.versions().items()}
-        self.variables = {key: value for key, value in os.environ.items() if key not in hidden}
+        self.variables = {key: value for key, value in os.environ.items() if key not in HIDDEN}
 
     def start(self, *arguments: object) -> subprocess.Popen[str]:
         """Start its Python, with a lower priority than the other tests."""
@@ -103,16 +103,9 @@ class Environment:
 
 @pytest.fixture
 def environment(tmp_path: Path) -> Iterator[Environment]:
-    """A copy of this environment, of links where that is possible."""
-
-    def link(source: str, target: str) -> None:
-        try:
-            os.link(source, target)
-        except OSError:
-            shutil.copy2(source, target)
-
+    """A copy of this environment."""
     prefix = tmp_path / "environment"
-    shutil.copytree(sys.prefix, prefix, symlinks=True, copy_function=link)
+    copy_environment(prefix)
     yield Environment(prefix)
     shutil.rmtree(prefix)
 
