@@ -14,7 +14,7 @@ PROJECT := setup.py setup.cfg pyproject.toml package.xml $(shell find trees laun
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH COLCON_PREFIX_PATH LD_LIBRARY_PATH PYTHONHOME PYTHONPATH
 unexport RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup dev demo quick test oracle docs chaos soak bench bench-short lint types format colcon clean python colcon-python
+.PHONY: help setup dev demo quick test oracle docs site chaos soak bench bench-short lint types format colcon clean python colcon-python
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -37,10 +37,12 @@ oracle: dev ## how often trees do what BehaviorTree.CPP did with them; CASES=FIL
 
 docs: dev ## remake the pages and pictures that come from the code; `make test` fails when one is stale
 	$(BIN)/python scripts/goal_doc.py
-	$(BIN)/python scripts/python_doc.py
 	$(BIN)/python scripts/yaml_doc.py
 	$(BIN)/python scripts/pictures.py
 	$(BIN)/python -m scripts.screenshots
+
+site: $(VENV)/docs.stamp ## the pages with a search, in build/site; a link that leads nowhere is an error
+	$(BIN)/python -m sphinx --quiet --fresh-env --write-all --fail-on-warning --keep-going -d build/doctrees docs build/site
 
 lint: dev ## ruff: rules and formatting; bandit: security; oxlint and oxfmt: the JavaScript
 	$(BIN)/ruff check .
@@ -95,6 +97,10 @@ $(VENV)/runtime.stamp: $(VENV)/interfaces.stamp constraints.txt $(PROJECT) | pyt
 
 $(VENV)/dev.stamp: setup.cfg constraints.txt | $(VENV)/runtime.stamp
 	@scripts/pip.sh $(VENV) "Installing the tools for tests and checks" install --editable '.[dev]'
+	@touch $@
+
+$(VENV)/docs.stamp: setup.cfg constraints.txt | $(VENV)/runtime.stamp
+	@scripts/pip.sh $(VENV) "Installing the tools for the site" install --editable '.[docs]'
 	@touch $@
 
 # An environment of its own: colcon builds the interfaces, so their wheels must not be installed.

@@ -37,6 +37,10 @@ def development() -> list[Requirement]:
     return requirements(setup_cfg()["options.extras_require"]["dev"])
 
 
+def site() -> list[Requirement]:
+    return requirements(setup_cfg()["options.extras_require"]["docs"])
+
+
 def build_environment() -> list[Requirement]:
     return [Requirement(line) for line in pins()]
 
@@ -110,7 +114,7 @@ def test_every_ros_package_is_pinned_to_the_version_in_the_constraints(
 
 def test_the_constraints_fit_what_is_required() -> None:
     pinned = constraints()
-    for requirement in runtime() + development() + build_environment():
+    for requirement in runtime() + development() + site() + build_environment():
         if requirement.name not in {folder.name for folder in INTERFACES}:
             assert pinned[canonicalize_name(requirement.name)] in requirement.specifier
 
