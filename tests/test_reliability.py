@@ -62,6 +62,18 @@ def test_what_a_report_is_about_is_read_back_from_it(tmp_path: Path) -> None:
     assert names(path.read_text(encoding="utf-8")) == rows
 
 
+def test_a_report_begins_with_what_came_out(tmp_path: Path) -> None:
+    path = tmp_path / "report.md"
+    unknown = Record("It's a fork", "One", outcome="STALLED, end UNKNOWN", verdict="passed")
+    taken = Record("Signals", "Two", shows="accepted; **1 executed twice**", verdict="passed")
+    write(path, [unknown, taken, Record("Signals", "Three", verdict="skipped: no network")])
+    begins = path.read_text(encoding="utf-8").partition("\n## ")[0]
+    assert "3 scenarios: 2 held, 0 did not, 1 were skipped." in begins
+    assert "In 1 the end of a goal was not known" in begins
+    assert "In 1 a second\nserver" in begins
+    assert "| [It's a fork](#its-a-fork) | 1 | 1 |\n| [Signals](#signals) | 2 | 1 |" in begins
+
+
 @pytest.mark.parametrize(
     ("visits", "told"),
     [

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
@@ -20,17 +20,28 @@ from tests.support.processes import Journal
 HEAD = """\
 # Reliability: what was tried, and what became of the goals
 
-Written by `make chaos` from its last run; do not edit. Each row is one scenario on the real
-middleware. The processes, signals and network cuts that a row names are real; what only takes the
-place of something is named as that. What a server did is read from its journal, a file it writes as
-each goal is received, accepted, canceled and finished ("–": no server took part): the client's own
-view is not believed. It stands beside that as the outcome, with the end of a goal where that is
-another. The time is the one from what was done to the outcome, where it was measured, rounded. All
-talk over UDP (on loopback, or on the link between two network namespaces) but the servers "with
-Fast DDS as it comes". How to get the short lease for servers of your own:
-[reliability-settings.md](reliability-settings.md). One row again: `python -m pytest tests/scenarios
--m "" -k killed_with_the_short_lease`, the words of its name. By hand: `bt-actions sim --fault
-move_robot:1:die` in one terminal, `bt-actions run` in another.
+<!-- Written by `make chaos` from its last run; do not edit. -->
+
+**What was tried.** Goals on the real middleware while servers are killed, stopped, restarted,
+late or there twice, answers are lost or doubled, trees change their mind, programs end, networks
+are cut. The processes, signals and network cuts are real; a row names what only takes the place
+of something.
+"""
+READING = """\
+**How to read a row.** A server writes a journal: a line as each goal is received, accepted,
+canceled and finished. A scenario is judged by that journal ("–": no server took part); the
+client's own view is not believed. It stands beside the journal as the outcome, with the end of a
+goal where that is another. The time is the one from what was done to the outcome, where it was
+measured, rounded.
+
+What no client can keep: [promises.md](promises.md#what-cannot-be-known-from-outside). The short
+lease for servers of your own: [reliability-settings.md](reliability-settings.md). All talk over
+UDP (on loopback, or on the link between two network namespaces) but the servers "with Fast DDS as
+it comes".
+
+One row again: `python -m pytest tests/scenarios -m "" -k killed_with_the_short_lease`, the words
+of its name. By hand: `bt-actions sim --fault move_robot:1:die` in one terminal, `bt-actions run`
+in another.
 """
 ON_A_BUSY_MACHINE = 3.0
 """Times longer than a scenario's limit is good enough where no report is written: `make test` runs
@@ -174,17 +185,43 @@ def sentence(name: str) -> str:
     return text[:1].upper() + text[1:] + (f" ({shown})" if shown else "")
 
 
+def anchor(title: str) -> str:
+    """Return the name by which a link leads to a section."""
+    return re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+
+
+def came_out(records: Sequence[Record]) -> str:
+    """Return in a paragraph what came out."""
+    good = sum(record.verdict == "passed" for record in records)
+    skipped = sum(record.verdict.startswith("skipped") for record in records)
+    unknown = sum("UNKNOWN" in record.outcome for record in records)
+    twice = sum("executed twice**" in record.shows for record in records)
+    text = f"{len(records)} scenarios: {good} held, {len(records) - good - skipped} did not"
+    text += f", {skipped} were skipped" if skipped else ""
+    return (
+        f"**What came out.** {text}.\n"
+        f"In {unknown} the end of a goal was not known in time, and the run said UNKNOWN. "
+        f"In {twice} a second\nserver of one name executed a goal, too; it was canceled there, or "
+        "named.\n"
+    )
+
+
+def overview(families: Mapping[str, Sequence[Record]]) -> list[str]:
+    """Return the table of all families."""
+    lines = ["| what was tried | scenarios | held |", "|---|---|---|"]
+    for title, rows in families.items():
+        good = sum(record.verdict == "passed" for record in rows)
+        lines.append(f"| [{title}](#{anchor(title)}) | {len(rows)} | {good} |")
+    return [*lines, ""]
+
+
 def write(path: Path, records: Iterable[Record]) -> None:
     """Write the report."""
     families: dict[str, list[Record]] = {}
     for record in records:
         families.setdefault(record.family, []).append(record)
-    count = sum(len(each) for each in families.values())
     ran = [record for each in families.values() for record in each]
-    good = sum(record.verdict == "passed" for record in ran)
-    skipped = sum(record.verdict.startswith("skipped") for record in ran)
-    lines = [HEAD, f"{count} scenarios: {good} held, {count - good - skipped} did not"]
-    lines[-1] += f", {skipped} were skipped.\n" if skipped else ".\n"
+    lines = [HEAD, came_out(ran), *overview(families), READING]
     for title, rows in families.items():
         lines += [f"## {title}\n"]
         lines += ["| scenario | what was done | the journal shows | outcome | time to outcome |"]
