@@ -63,7 +63,7 @@ HEAD = f"""\
 
 A tree is a YAML file. `bt-actions check` finds what is wrong with it before a robot moves,
 `bt-actions format` puts it in canonical form, and `bt-actions schema` prints a JSON Schema for
-completion in editors. The files on this page are in [examples/](../examples).
+completion in editors. The files on this page are in `examples/`.
 
 @fetch
 
@@ -136,6 +136,27 @@ In the fields of a message, and in variables that fill them (but for `now` and c
 rules are in [rules.md](rules.md), and `bt-actions explain BT301` prints one.
 
 """
+RULES_HEAD = """\
+A finding names its place and its rule: `fetch.yaml:10:13: error[BT203]: ...`. `bt-actions explain
+BT203` prints the section of that rule from this page. A tree with an error does not run; one with
+warnings does. `# bt: ignore[BT301] why` on a line silences a warning there, never an error.
+
+## What a first tree meets
+
+| code | | what to do |
+|---|---|---|"""
+FIRST_MET = {
+    "BT102": "indent as the lines around; put a text that holds `: ` in quotes",
+    "BT107": "mend the spelling; [yaml.md](yaml.md) has the keys of each kind",
+    "BT201": "name the action under `actions`, or mend the spelling of the kind",
+    "BT202": "declare the variable under `inputs` or `topics`, or `save` or `set` one before",
+    "BT203": "`bt-actions interfaces show TYPE` has the fields",
+    "BT205": "build the package ([interfaces.md](interfaces.md)), or source its workspace",
+    "BT301": "give the action a `timeout`; without one a lost robot is waited for for ever",
+    "BT306": "leave `memory: false` away",
+}
+"""The rules that beginners meet, and the remedy of each in a line."""
+
 ALIAS_HEAD = """\
 ### An action by its name
 
@@ -362,6 +383,10 @@ def rules_page() -> str:
     lines = [
         "# The rules of `bt-actions check`", "",
         f"<!-- Made by scripts/yaml_doc.py from {RULES_FILE}. Do not edit. -->", "",
+        *RULES_HEAD.split("\n"),
+        *(f"| [{code}](#{code.lower()}) | {RULES[code].title} | {remedy} |"
+          for code, remedy in FIRST_MET.items()), "",
+        "## All rules", "",
         "| code | | |", "|---|---|---|",
         *(f"| [{rule.code}](#{rule.code.lower()}) | {rule.severity} | {rule.title} |"
           for rule in RULES.values()), "",
