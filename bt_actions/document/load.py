@@ -84,27 +84,27 @@ class Tree:
 
     @property
     def name(self) -> str:
-        """As its file says, which may be called otherwise."""
+        """The name in the file; the file itself may have another name."""
         return self._document.name
 
     @property
     def description(self) -> str:
-        """What it is for, in its own words; may be empty."""
+        """What the tree is for, in the words of its file; may be empty."""
         return str(self._document.values.get("description", ""))
 
     @property
     def inputs(self) -> dict[str, TreeInput]:
-        """What it wants to be given."""
+        """The inputs of the tree."""
         return inputs_of(self._document)
 
     @property
     def warnings(self) -> list[Finding]:
-        """What was found in it; no errors."""
+        """The warnings that the tree has; an error would have raised."""
         return self._workspace.findings
 
     @property
     def files(self) -> dict[Path, str]:
-        """Every file that it is made of, as named, with the text that was read (none of data)."""
+        """Every file of the tree, as named, with the text that was read (none of data)."""
         return self._workspace.files
 
     def check_inputs(self, inputs: Mapping[str, object]) -> None:
@@ -112,7 +112,7 @@ class Tree:
         check_inputs(self._document, inputs, types=self._types)
 
     def build(self, inputs: Mapping[str, object] | None = None, *, once: bool = False) -> Behaviour:
-        """New behaviours, with variables of their own; needs no node and no server.
+        """Make behaviours, with variables of their own; no node and no server are needed.
 
         With `once` this is the last call: what was read is let go of on the way. Raises InputError
         for inputs that do not fit, DocumentError for a class of a ``python:`` node that fails when
@@ -182,7 +182,7 @@ def load_tree(
     types: bool = True,
     python: bool = True,
 ) -> Behaviour:
-    """The behaviours of a tree, ready to be run; needs no node and no server.
+    """Return the behaviours of a tree, ready to be run; no node and no server are needed.
 
     `path` is a file, or the name of an installed tree. `inputs` are converted to the types that
     the tree declares. With `types=False` no ROS interface is looked up. With `python=False` a
@@ -196,12 +196,12 @@ def load_tree(
 
 
 def tree_inputs(path: PathLike) -> dict[str, TreeInput]:
-    """What a tree wants to be given. Raises DocumentError as `load_tree` does."""
+    """Return the inputs of a tree. Raises DocumentError as `load_tree` does."""
     return open_tree(path, types=False).inputs
 
 
 def given_inputs(root: Behaviour) -> dict[str, tuple[TreeInput, object]]:
-    """The inputs of a loaded tree that was not run yet, with the values that it was given."""
+    """Return the inputs of a loaded tree that has not run yet, with the values given to them."""
     loaded = getattr(root, LOADED, None)
     if not isinstance(loaded, Loaded):
         return {}
@@ -210,19 +210,19 @@ def given_inputs(root: Behaviour) -> dict[str, tuple[TreeInput, object]]:
 
 
 def tree_name(root: Behaviour) -> str:
-    """The name that its file gives a loaded tree; the root's own where no file made it."""
+    """Return the name of a loaded tree in its file; the root's own where no file made the tree."""
     loaded = getattr(root, LOADED, None)
     return loaded.document.name if isinstance(loaded, Loaded) else root.name
 
 
 def sources_of(root: Behaviour) -> dict[str, str]:
-    """The texts of the files that a loaded tree was made of, by path; none of a tree in Python."""
+    """Return the texts of a loaded tree's files, by path; none of a tree in Python."""
     loaded = getattr(root, LOADED, None)
     return dict(loaded.sources) if isinstance(loaded, Loaded) else {}
 
 
 def tree_outputs(root: Behaviour) -> dict[str, object]:
-    """The outputs of a loaded tree that have a value by now, by name; arrays as lists."""
+    """Return the outputs of a loaded tree that have a value by now, by name; arrays as lists."""
     loaded = getattr(root, LOADED, None)
     if not isinstance(loaded, Loaded):
         return {}
@@ -245,7 +245,7 @@ def hidden_outputs(root: Behaviour) -> set[str]:
 
 @_no_collecting
 def check_file(path: PathLike, *, types: bool = True, python: bool = True) -> list[Finding]:
-    """Everything that is wrong with a tree, and with all that it includes and imports.
+    """Find everything that is wrong with a tree, and with all that it includes and imports.
 
     A class that a ``python:`` node names is imported for it, unless `types` or `python` is False;
     with `python=False` such a node is an error.
@@ -263,7 +263,7 @@ def check_file(path: PathLike, *, types: bool = True, python: bool = True) -> li
 
 @_no_collecting
 def check_source(source: Source, *, types: bool = True, python: bool = True) -> list[Finding]:
-    """As `check_file`, for a text that was read already."""
+    """Do as `check_file` does, for a text that was read already."""
     workspace = Workspace()
     try:
         workspace.open_source(source)
@@ -312,5 +312,5 @@ def _found(path: PathLike) -> Path:
 
 
 def _shown(path: PathLike, found: Path) -> str | None:
-    """The name to show: as it was given where that is the file, else where it was found."""
+    """Return the path to show: the given one where that is the file, else where it was found."""
     return os.fspath(path) if path is found or Path(path) == found else None

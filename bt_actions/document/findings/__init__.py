@@ -109,7 +109,7 @@ class Finding:
         return self.text()
 
     def text(self, width: int = 200) -> str:
-        """As a compiler prints it; the source line is cut to `width` columns."""
+        """Return the finding in a compiler's form; the source line is cut to `width` columns."""
         lines = [self.headline()]
         if self.source_line is not None:
             lines += _excerpt(self, width)

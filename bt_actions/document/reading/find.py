@@ -80,7 +80,7 @@ def tree_folder(place: str | os.PathLike[str]) -> Path:
 
 
 def installed_trees() -> dict[str, Path]:
-    """Every tree that can be named, with its file."""
+    """Return every tree that can be named, with its file."""
     found: dict[str, Path] = {}
     for folder in tree_folders():
         try:
