@@ -135,8 +135,10 @@ class Page:
     def text(self, where: str, words: str) -> str:
         """Wait for words in an element; return its text."""
         element = f"document.querySelector({where!r})"
-        self.window.wait_for(f"{element}?.innerText.includes(arguments[0])", words)
-        return str(self.window.run(f"return {element}.innerText"))
+        found = self.window.wait_for(f"{element}?.innerText.includes(arguments[0])", words)
+        text = str(self.window.run(f"return {element}?.innerText"))
+        assert found, text
+        return text
 
 
 @pytest.fixture

@@ -66,7 +66,7 @@ def test_an_earlier_failure_says_what_was_expected_and_who_went_on(over: Page) -
 def test_a_leap_to_a_failure_shows_that_moment_everywhere(over: Page) -> None:
     window = over.open()
     window.run("page.seek(0)")
-    over.text("#why", "Then")
+    over.text("#why", "Not begun")
     window.keys("n")
     assert "UNEXPECTED_RESULT" in over.text("#details", "Attempt 1 of 3")
     t = window.run("return page.t")
