@@ -93,7 +93,8 @@ def read_map(path: Path) -> Map:
     return Map(
         {**known.leaves, **own.leaves},
         {key: {**known.words.get(key, {}), **own.words.get(key, {})} for key in WORDS},
-        {**known.imports, **own.imports},
+        {name: each for name, each in known.imports.items() if own.section_of(name) is None}
+        | own.imports,
         own.constants,
     )
 
