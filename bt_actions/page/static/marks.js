@@ -85,22 +85,20 @@ export class Marks {
       app.seek(a.decided);
       app.select(a.n, { reveal: true, attempt: a.i });
     };
-    this.rows
-      .get("!")
-      .row.append(
-        el(
-          "button",
-          {
-            class: "flag",
-            tabindex: "-1",
-            style: `left:${px(x)}`,
-            title: `${when} ${app.run.nodes[a.n].name}: ${a.oc}`,
-            "aria-label": `${a.oc} at ${when}`,
-            onclick: press,
-          },
-          status_glyph(a.backoff ? "backoff" : "failure"),
-        ),
-      );
+    this.rows.get("!").row.append(
+      el(
+        "button",
+        {
+          class: "flag",
+          tabindex: "-1",
+          style: `left:${px(x)}`,
+          title: `${when} ${app.run.nodes[a.n].name}: ${a.oc}`,
+          "aria-label": `${a.oc} at ${when}`,
+          onclick: press,
+        },
+        status_glyph(a.backoff ? "backoff" : "failure"),
+      ),
+    );
   }
 
   // Whether a server is in sight, and when it was not.
