@@ -22,7 +22,7 @@ from typing import Any
 
 from bt_actions.utilities.plain_text import as_json, clean
 from bt_actions.utilities.suggest import did_you_mean
-from bt_actions.utilities.whole_file import replace_file
+from bt_actions.utilities.whole_file import replace_file, replacing
 
 FIRST = "run.mcap"
 """The first file of a run in a folder of its own."""
@@ -31,6 +31,17 @@ SUCCEEDED, FAILED = 20, 100
 BYTES = 500_000_000
 """Of all kept runs together."""
 _LONGEST_SUMMARY = 100_000
+_TEXTS = ("run_id", "tree", "request", "caller", "status", "stopped_by", "cause", "unrecorded")
+UNREADABLE = (
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    RecursionError,
+)
+"""What is raised of a summary that is none, or of another version."""
 _STRANGE = re.compile(r"[^\w.-]+", re.ASCII)
 
 
@@ -60,6 +71,8 @@ class Summary:
     seconds: float | None = None
     cause: str = ""
     """Why it failed, on one line."""
+    unrecorded: str = ""
+    """Since when the run was not recorded, and why, as ``12:03:10: the disk is full``."""
 
     @property
     def failed(self) -> bool:
@@ -144,33 +157,28 @@ def write_summary(first: Path, summary: Summary) -> None:
 def read_summary(first: Path) -> Summary | None:
     """Return the summary, or None where none can be read."""
     try:
-        with summary_of(first).open("rb") as file:
-            data: Any = json.loads(file.read(_LONGEST_SUMMARY))
-        text = {
-            name: clean(str(data.get(name) or ""))
-            for name in ("run_id", "tree", "request", "caller", "status", "stopped_by", "cause")
-        }
-        where = {clean(name): clean(str(each)) for name, each in data.get("where", {}).items()}
-        code, seconds = data.get("exit_code"), data.get("seconds")
-        began = float(data["began"])
-        time.localtime(began)  # raises where no clock can show that
-        return Summary(
-            **text,
-            began=began,
-            where=where,
-            exit_code=None if code is None else int(code),
-            seconds=None if seconds is None else float(seconds),
-        )
-    except (
-        OSError,
-        ValueError,
-        LookupError,
-        TypeError,
-        AttributeError,
-        ArithmeticError,
-        RecursionError,
-    ):
+        return read_fields(summary_of(first))[0]
+    except UNREADABLE:
         return None
+
+
+def read_fields(path: Path) -> tuple[Summary, Any]:
+    """Return a summary, and all fields of its file; raises one of UNREADABLE."""
+    with path.open("rb") as file:
+        data: Any = json.loads(file.read(_LONGEST_SUMMARY))
+    text = {name: clean(str(data.get(name) or "")) for name in _TEXTS}
+    where = {clean(name): clean(str(each)) for name, each in data.get("where", {}).items()}
+    code, seconds = data.get("exit_code"), data.get("seconds")
+    began = float(data["began"])
+    time.localtime(began)  # raises where no clock can show that
+    read = Summary(
+        **text,
+        began=began,
+        where=where,
+        exit_code=None if code is None else int(code),
+        seconds=None if seconds is None else float(seconds),
+    )
+    return read, data
 
 
 # All of them
@@ -256,6 +264,22 @@ def held(path: Path, *, alone: bool = False, waits: bool = False) -> Iterator[bo
         yield is_held
     finally:
         os.close(descriptor)
+
+
+@contextlib.contextmanager
+def locked(path: Path, data: bytes) -> Iterator[None]:
+    """Hold a file with some data alone: who sees the file meanwhile, sees it locked.
+
+    A process that is killed leaves the file, which is locked no more. Raises OSError.
+    """
+    with replacing(path) as file:
+        file.write(data)
+        lock = os.dup(file.fileno())
+        fcntl.flock(lock, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        os.close(lock)
 
 
 def is_written(first: Path) -> bool:

@@ -55,6 +55,8 @@ from bt_actions.story.state import State
 
 MOST_NAMES = 1_000_000
 """Nodes, variables, servers and goals of one run that are read."""
+LAST = 2**53 - 1
+"""The highest number of an event: what JSON holds in every language, and no run reaches."""
 MOST_BYTES = 100_000_000
 """Of all tree files and other attachments."""
 _STATUS = {number: status for status, number in STATUSES.items()}
@@ -206,6 +208,9 @@ class Recording:
 
         One that is damaged and far ahead costs none of those behind it.
         """
+        if number > LAST:
+            self.damaged += 1
+            return False
         if number > self._number:
             self._before = self._number
         elif not self._before < number < self._number:

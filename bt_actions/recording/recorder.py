@@ -13,7 +13,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from py_trees.common import Status
@@ -31,7 +31,8 @@ from bt_actions.recording.folders import (
     prune,
     write_summary,
 )
-from bt_actions.recording.writing import RunWriter
+from bt_actions.recording.unrecorded import since_text, told
+from bt_actions.recording.writing import RunWriter, said_of
 from bt_actions.story.state import State
 from bt_actions.story.why import attempt_text
 from bt_actions.story.words import judged
@@ -55,6 +56,8 @@ class Wish:
     """The first file itself, for one run."""
     values: bool = True
     """Whether goals, results, feedback, variables and inputs are kept."""
+    why_not: str = ""
+    """Why nothing is to be kept, or ""; that such a run goes on is told all the same."""
 
 
 class Recorder:
@@ -97,8 +100,8 @@ class Recorder:
         if run.first is not None:
             with contextlib.suppress(OSError):
                 finish_beside(run.first, may_wait=not self._runs)
-        if self._wish.first is None and self._wish.where is None:  # else it is kept for good
-            prune()
+            if self._wish.first is None and self._wish.where is None:  # else it is kept for good
+                prune()
 
     def _tell(self, text: str) -> None:
         with contextlib.suppress(Exception):  # a log that is closed
@@ -118,8 +121,12 @@ class _Run:
     ) -> None:
         self._stream, self._reader, self._tick = stream, reader, tick
         self._wish, self._say = wish, say
+        self._began: RunBegan | None = None
         self._early: list[Event] = []
         """What came before the run began."""
+        self._unrecorded = ""
+        """Since when nothing is recorded, and why, or ""."""
+        self._is_over = self._is_broken = False
         self._later: list[Event] = []
         """What came while the step before was at it: a heartbeat stands before it."""
         self._writer: RunWriter | None = None
@@ -131,42 +138,58 @@ class _Run:
     def step(self, now: float, *, last: bool) -> bool:
         """Write what has come until now; return whether nothing more is written."""
         try:
-            return self._write(now, last=last)
+            self._write(now, last=last)
         except Exception as error:  # noqa: BLE001 - a bug, from which no other run may suffer
             where = traceback.extract_tb(error.__traceback__)[-1]
             place = f"{where.filename}:{where.lineno}"
             self._say(f"this run is not recorded any further: {error!r} ({place})")
-            return True
+            self._lose(self._stream.now()[1], repr(error))
+            self._is_broken = True
+        return self._is_over
 
-    def _write(self, now: float, *, last: bool) -> bool:
-        done, at = last, self._stream.now()
+    def _write(self, now: float, *, last: bool) -> None:
+        at = self._stream.now()
         events = [*self._later, *self._reader.take()]
         self._later = [each for each in events if each.at.steady > at[0] and not last]
-        for event in events[: len(events) - len(self._later)]:
-            if isinstance(event, RunBegan) and self._writer is None and not self._begin(event):
-                done = True
-                break
+        taken = events[: len(events) - len(self._later)]
+        self._is_over = last or any(isinstance(each, RunEnded) for each in taken)
+        for event in taken:
+            if isinstance(event, RunBegan) and self._began is None:
+                self._began = event
+                self._begin(event)
             self._take(event)
-            done = done or isinstance(event, RunEnded)
             time.sleep(0)  # whoever waits for Python's lock is next
         writer = self._writer
-        if writer is not None:
-            if now - self._beat >= BEAT and not done:
+        if writer is not None and not self._unrecorded:
+            if now - self._beat >= BEAT and not self._is_over:
                 self._beat, began = now, self._tick()
                 writer.beat(*at, 0.0 if began is None else max(0.0, at[0] - began))
             writer.flush()
-            done = done or bool(writer.failed)
-        return done
+            if writer.failed:
+                self._lose(at[1], writer.failed)
 
     def _take(self, event: Event) -> None:
-        if self._writer is None:
-            self._early.append(event)
-        else:
+        if self._is_broken:
+            return
+        if self._writer is not None:
             self._writer.add(event)
+        elif self._began is None:
+            self._early.append(event)
 
-    def _begin(self, began: RunBegan) -> bool:
+    def _lose(self, since: float, why: str) -> None:
+        """Have it told, until the run is over, that nothing is recorded from now on."""
+        if self._began is not None and not self._unrecorded:
+            self._unrecorded = since_text(since, why)
+            known = begun(self._began, values=self._wish.values)
+            with contextlib.suppress(OSError):  # there is no place to tell it
+                self._locks.enter_context(told(known, since, why))
+
+    def _begin(self, began: RunBegan) -> None:
         """Make the run's files; say it where that cannot be done."""
         wish, made = self._wish, contextlib.ExitStack()
+        if wish.why_not:
+            self._lose(began.at.wall, wish.why_not)
+            return
         try:
             with made:  # is removed again where the beginning fails
                 first = wish.first
@@ -185,12 +208,12 @@ class _Run:
             remedy = "set XDG_STATE_HOME to a folder that can be written, or say --no-record"
             folder = f"{error.filename}: {error.strerror}"
             self._say(f"this run is not recorded: {folder}; {remedy}")
-            return False
+            self._lose(began.at.wall, said_of(error))
+            return
         self.first, self._writer = first, writer
         for event in self._early:
             self._writer.add(event)
         self._early.clear()
-        return True
 
     def end(self) -> None:
         """Close the files, and let go of all."""
@@ -200,7 +223,8 @@ class _Run:
                 with contextlib.suppress(OSError):  # which was said where it matters: of the events
                     self._writer.close()
                     if self._writer.state.began is not None:
-                        write_summary(self.first, summary(self._writer.state))
+                        ended = summary(self._writer.state)
+                        write_summary(self.first, replace(ended, unrecorded=self._unrecorded))
 
 
 def begun(began: RunBegan, *, values: bool = True) -> Summary:

@@ -8,6 +8,7 @@ state of the run; of a run beyond 100 MB the oldest files go, the first excepted
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import os
 from collections.abc import Callable
@@ -110,10 +111,12 @@ class RunWriter:
             told = self._attach(event)
         if not self._values and told is not None:
             told = bare(told)
-        if told is None or self.failed:
+        if told is None:
+            return
+        self.state.observe(told)
+        if self.failed:
             return
         self._number = told.at.number
-        self.state.observe(told)
         self._put(told)
         if self._written + self._buffer.tell() >= max(self._size, 2 * self._head):
             self._begin_part()
@@ -255,10 +258,17 @@ class RunWriter:
 
     def _give_up(self, error: OSError) -> None:
         """Leave a file of whole records, and write no more."""
-        self.failed = os.strerror(error.errno) if error.errno else str(error)
+        self.failed = said_of(error)
         with contextlib.suppress(OSError):  # a disk that is gone
             os.ftruncate(self._descriptor, self._written)
         self._say(f"this run is not recorded any further: {self.failed} ({self.first.parent})")
+
+
+def said_of(error: OSError) -> str:
+    """Say why nothing can be written."""
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return "the disk is full"
+    return os.strerror(error.errno) if error.errno else str(error)
 
 
 def part_of(first: Path, number: int) -> Path:

@@ -451,7 +451,7 @@ def test_a_full_disk_leaves_whole_records_and_is_said_once(
     monkeypatch.undo()
     assert writer.failed
     assert len(said) == 1
-    assert "No space left" in said[0]
+    assert "disk is full" in said[0]
     assert first.stat().st_size in ends_of_records(first.read_bytes())
     items = told(read(first))
     assert 0 < len(items) < len(events)

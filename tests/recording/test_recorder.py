@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import random
 import subprocess
@@ -10,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -25,10 +27,20 @@ from bt_actions.events import (
 )
 from bt_actions.events.stream import Stream
 from bt_actions.recording import recorder as recorder_module
+from bt_actions.recording import writing
 from bt_actions.recording.finishing import is_finished
-from bt_actions.recording.folders import SUCCEEDED, home, is_written, read_summary, recorded
+from bt_actions.recording.folders import (
+    SUCCEEDED,
+    Summary,
+    home,
+    is_written,
+    read_summary,
+    recorded,
+)
 from bt_actions.recording.reading import Recording
 from bt_actions.recording.recorder import BEAT, Recorder, Wish
+from bt_actions.recording.unrecorded import told, unrecorded
+from bt_actions.recovery.ledger import directory
 from tests.support.every_kind import NODES, RUN_ID, WHERE
 from tests.support.waiting import until
 
@@ -239,10 +251,11 @@ def test_a_bug_in_the_recording_of_one_run_costs_no_other_run_anything(
     recorder.record(one, lambda: 1 / 0)
     recorder.record(other, lambda: None)
     begin(one, "aa" * 16)
-    until(lambda: not one.is_read, what="it is given up")
+    until(lambda: said, what="it is given up")
     begin(other, "bb" * 16)
     end(other)
     until(lambda: not other.is_read)
+    assert ["ZeroDivisionError" in each.why for each in unrecorded()] == [True]
     recorder.close()
     assert len(said) == 1
     assert "not recorded any further: ZeroDivisionError" in said[0]
@@ -250,6 +263,77 @@ def test_a_bug_in_the_recording_of_one_run_costs_no_other_run_anything(
     assert runs["bb"].summary.status == "SUCCESS"
     assert not runs["aa"].is_written
     assert Recording(runs["aa"].first).state().began is not None
+
+
+# What is not recorded
+
+
+def test_a_run_whose_disk_is_full_goes_on_and_is_told_not_to_be_recorded(
+    tmp_path: Path, said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder, stream = Recorder(Wish(where=tmp_path), said.append), Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    first = until(lambda: recorded(tmp_path) and recorded(tmp_path)[0].first)
+    until(lambda: Recording(first).state() if first.stat().st_size > 5000 else None)
+
+    def full(*_: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(writing.os, "write", full)
+        stream.add(VariableWritten, "x", 1, None)
+        (gap,) = until(unrecorded)
+    assert (gap.summary.run_id, gap.why) == (RUN_ID, "the disk is full")
+    assert gap.since == pytest.approx(time.time(), abs=10.0)
+    assert is_written(first)  # it goes on
+    end(stream)
+    until(lambda: not stream.is_read)
+    until(lambda: not is_written(first))
+    assert unrecorded() == []
+    summary = read_summary(first)
+    assert summary is not None
+    assert (summary.status, summary.unrecorded) == ("SUCCESS", str(gap))
+    assert len(said) == 1
+    recorder.close()
+
+
+def test_a_run_that_cannot_be_recorded_is_told_while_it_goes_on(
+    tmp_path: Path, said: list[str]
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    recorder, stream = Recorder(Wish(where=tmp_path / "file"), said.append), Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    (gap,) = until(unrecorded)
+    assert (gap.summary.tree, gap.why) == ("tree", "File exists")
+    end(stream)
+    recorder.close()
+    assert unrecorded() == []
+
+
+def test_of_a_run_that_is_not_to_be_recorded_nothing_stays(said: list[str]) -> None:
+    recorder, stream = Recorder(Wish(why_not="--no-record"), said.append), Stream(Clock())
+    recorder.record(stream, lambda: None)
+    begin(stream)
+    (gap,) = until(unrecorded)
+    assert str(gap).endswith(": --no-record")
+    end(stream)
+    until(lambda: not unrecorded())
+    recorder.close()
+    assert (said, home().exists(), list(directory().iterdir())) == ([], False, [])
+
+
+def test_what_a_killed_process_left_is_not_told_and_goes_with_the_next(tmp_path: Path) -> None:
+    summary = Summary("ab" * 16, "tree", time.time())
+    with told(summary, 0.0, "--no-record"):
+        (file,) = directory().iterdir()
+        left = file.read_bytes()
+        assert len(unrecorded()) == 1
+    file.write_bytes(left)
+    assert unrecorded() == []
+    with told(replace(summary, run_id="cd" * 16), 0.0, "--no-record"):
+        assert [each.name for each in directory().iterdir()] == ["cd" * 16 + ".unrecorded"]
 
 
 def test_a_run_that_somebody_stopped_has_not_failed(recorder: Recorder, tmp_path: Path) -> None:
@@ -267,8 +351,6 @@ def test_a_run_that_somebody_stopped_has_not_failed(recorder: Recorder, tmp_path
 def test_nobody_who_tells_an_event_waits_for_the_disk(
     recorder: Recorder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from bt_actions.recording import writing
-
     goes_on = threading.Event()
     write = os.write
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from bt_actions.events import Event, RunBegan
 from bt_actions.recording import folders, recorder
 from bt_actions.recording.finishing import finish
-from bt_actions.recording.folders import FIRST, folder_for, write_summary
+from bt_actions.recording.folders import FIRST, folder_for, held, home, write_summary
 from bt_actions.recording.mcap_records import Attachment, Message, records
 from bt_actions.recording.writing import RunWriter
 
@@ -46,6 +46,37 @@ def record(
         write_summary(first, recorder.summary(writer.state))
         finish(first)
     return first
+
+
+class Going:
+    """A run that is being written."""
+
+    def __init__(self, events: list[Event], **options: int) -> None:
+        began = next(each for each in events if isinstance(each, RunBegan))
+        self.first = folder_for(began.run_id, began.tree, began.at.wall, home()) / FIRST
+        self.writer = RunWriter(self.first, began, **options)  # type: ignore[arg-type]
+        self._lock = held(self.first, alone=True)
+        self._lock.__enter__()
+        self._goes_on = True
+        write_summary(self.first, recorder.begun(began))
+
+    def write(self, events: list[Event]) -> None:
+        for event in events:
+            self.writer.add(event)
+        self.writer.flush()
+
+    def end(self) -> None:
+        if self._goes_on:
+            self._goes_on = False
+            self.writer.close()
+            self._lock.__exit__(None, None, None)
+
+    def beat(self, seconds: float, tick: float = 0.0) -> None:
+        """Tell that the process lives, so many seconds after its latest event."""
+        assert self.writer.state.now is not None
+        at = self.writer.state.now
+        self.writer.beat(at.steady + seconds, at.wall + seconds, at.ros, tick)
+        self.writer.flush()
 
 
 def _numbered(event: Event) -> Event:

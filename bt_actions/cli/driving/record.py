@@ -38,16 +38,16 @@ def add_options(parser: argparse.ArgumentParser, *, one_run: bool) -> None:
 
 def recorder(
     args: argparse.Namespace, say: Callable[[str], None] = lambda text: note(f"bt-actions: {text}")
-) -> Recorder | None:
-    """Return what records the command's runs, or None; raises BadInput."""
+) -> Recorder:
+    """Return what records the command's runs, or tells that they are not; raises BadInput."""
     how = os.environ.get(VARIABLE) or "all"
     if how not in _WORDS:
         raise BadInput(f"{VARIABLE} is {how!r}; it is one of {', '.join(_WORDS)}")
     path: Path | None = args.record
-    if args.no_record or (how == "off" and path is None):
-        return None
     from bt_actions.recording.recorder import Recorder, Wish
 
+    if args.no_record or (how == "off" and path is None):
+        return Recorder(Wish(why_not="--no-record" if args.no_record else f"{VARIABLE}=off"), say)
     values = how != "events"
     if args.command == "serve":
         return Recorder(Wish(where=path, values=values), say)
