@@ -26,6 +26,7 @@ COMMANDS = {
     "list": "list_trees",
     "call": "call",
     "control": "control",
+    "watch": "watch",
     "runs": "runs",
     "report": "report",
     "replay": "replay",

@@ -25,10 +25,12 @@ def complete(parser_of: Callable[[str], Parser]) -> None:
     typed = os.environ["COMP_LINE"][: int(os.environ["COMP_POINT"])] + "."
     command = typed.split()[1] if len(typed.split()) > 2 else ""
     parser = parser_of(command)
-    for each in (parser, *parser.commands.values()):
+    for name, each in {"": parser, **parser.commands}.items():
         for action in each._actions:  # noqa: SLF001 - argparse has no public way to read a parser
-            if isinstance(action.metavar, str) and action.metavar in _VALUES:
-                action.completer = _VALUES[action.metavar]  # type: ignore[attr-defined]
+            words = action.metavar if isinstance(action.metavar, str) else ""
+            found = _VALUES.get(f"{name} {words}", _VALUES.get(words))
+            if found is not None:
+                action.completer = found  # type: ignore[attr-defined]
     argcomplete.autocomplete(parser, always_complete_options=not command)
 
 
@@ -89,5 +91,6 @@ _VALUES = {
     "CODE": _rules,
     "SPEC": _faults,
     "RUN": _runs,
+    "watch NAME": _runs,
 }
-"""By the words that stand for values in help."""
+"""By the words that stand for values in help, of all commands or of one."""

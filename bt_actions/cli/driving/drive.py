@@ -92,7 +92,7 @@ class Drive:
         """The user did not wait for the goals to end: threads are still running."""
         self._takes = self._lost = False
         """Whether something could not be shown."""
-        self._watched = _pipe_of_stdout()
+        self._watched = pipe_of_stdout()
 
     def run(self) -> None:
         """Run the tree to its end. Main thread only."""
@@ -275,7 +275,7 @@ def cause_of(state: State) -> str:
     return f"{state.stop.why}{', left without waiting' if state.abandoned else ''}"
 
 
-def _pipe_of_stdout() -> int:
+def pipe_of_stdout() -> int:
     """Return standard output's descriptor where a reader could go away, else -1."""
     try:
         descriptor = results().fileno()

@@ -1,0 +1,126 @@
+"""All runs of a user at once: drawn anew in a terminal, or a line for each change.
+
+What ends scrolls by once, with why it failed.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+
+from rich.console import Console
+from rich.live import Live
+from rich.text import Text
+
+from bt_actions.cli.streams.writing import write
+from bt_actions.recording.watching import Seen
+from bt_actions.story.doing import doing
+from bt_actions.utilities.plain_text import clean
+
+_LOOKS = {
+    "running": ("▶", ">", "bold cyan"),
+    "waiting": ("▶", ">", "yellow"),
+    "success": ("✓", "+", "green"),
+    "failure": ("✗", "x", "red"),
+    "stopped": ("·", ".", "yellow"),
+    "lost": ("?", "?", "bold red"),
+}
+NOTHING = "no run goes on"
+
+
+def title(seen: Seen) -> str:
+    """Say which run it is, and how it stands."""
+    where = " in sim" if seen.summary.is_simulated else ""
+    return f"{seen.summary.tree}  {seen.summary.run_id[:8]}{where}  {seen.word}"
+
+
+class WatchedLines:
+    """A line for each change, with the time of the day before it."""
+
+    def __init__(self) -> None:
+        self._told: dict[str, tuple[str, ...]] = {}
+
+    def show(self, runs: Iterable[Seen]) -> None:
+        """Write what has changed since the last time. Raises OutputLost or BrokenPipeError."""
+        for seen in runs:
+            key, words = seen.summary.run_id, _lasting(seen)
+            before = self._told.get(key, ("",))
+            self._told[key] = words
+            if words[0] != before[0]:
+                self._say(title(seen))
+            if seen.is_over and words != before:
+                write("".join(f"    {line}\n" for line in seen.why))
+            elif not seen.is_over:
+                for line in words[1:]:
+                    if line not in before[1:]:
+                        self._say(f"{seen.summary.tree}  {key[:8]}  {line}")
+
+    def close(self) -> None:
+        """Nothing is left to do."""
+
+    def _say(self, text: str) -> None:
+        write(f"{time.strftime('%H:%M:%S')}  {text}\n")
+
+
+def _lasting(seen: Seen) -> tuple[str, ...]:
+    """What is told of a run, without what changes all the time; first, how it stands."""
+    word = seen.look if seen.look == "lost" or seen.word.startswith("Stale") else seen.word
+    does = []
+    for each in () if seen.is_over else seen.state.running:
+        said = doing(seen.state, each)._replace(told="", until="")
+        name = seen.state.called(each.node.id)
+        does.append(clean(f"{name}: {said}" if str(said) else f"{name} runs"))
+    return word, *does
+
+
+class WatchedScreen:
+    """The runs that go on, at the bottom of a terminal; above them what has ended."""
+
+    def __init__(self, console: Console, last: str) -> None:
+        """`last` says how the last run ended, for as long as none goes on."""
+        self._console, self._last = console, last
+        self._is_plain = console.options.ascii_only
+        self._ended: set[str] = set()
+        self._live = Live(
+            console=console,
+            auto_refresh=False,
+            transient=True,
+            redirect_stdout=False,
+            redirect_stderr=False,
+            vertical_overflow="crop",
+        )
+        self._live.start()
+
+    def show(self, runs: list[Seen]) -> None:
+        """Draw how the runs stand; let those scroll by that have ended."""
+        for seen in runs:
+            if seen.is_over and seen.summary.run_id not in self._ended:
+                self._ended.add(seen.summary.run_id)
+                self._last = ""
+                for line in self._lines(seen):
+                    self._console.print(line, soft_wrap=True)
+        going = [each for each in runs if not each.is_over or each.look == "lost"]
+        lines = [line for seen in going for line in self._lines(seen)]
+        if not lines:
+            lines = [Text(NOTHING, style="dim"), *([Text(self._last)] if self._last else [])]
+        room = max(1, self._console.height - 2)
+        if len(lines) > room:
+            more = f"{len(lines) - room + 1} more lines"
+            lines = [*lines[: room - 1], Text(more, style="dim")]
+        lines.append(Text("Ctrl-C ends", style="dim"))
+        for line in lines:
+            line.no_wrap = True
+            line.truncate(
+                self._console.width - 1, overflow="crop" if self._is_plain else "ellipsis"
+            )
+        self._live.update(Text("\n").join(lines), refresh=True)
+
+    def close(self) -> None:
+        """Take the drawing away."""
+        self._live.stop()
+
+    def _lines(self, seen: Seen) -> list[Text]:
+        glyph, plain, style = _LOOKS[seen.look]
+        lasts = "" if seen.is_over else f"  {seen.seconds:.1f} s"
+        head = Text.assemble((plain if self._is_plain else glyph, style), f" {title(seen)}{lasts}")
+        return [head, *(Text(f"    {line}") for line in seen.why)]
