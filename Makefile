@@ -25,6 +25,7 @@ dev: $(VENV)/dev.stamp ## setup, and the tools for tests and checks
 
 demo: setup ## pick and place against simulated servers, ten times as fast as real
 	$(BIN)/bt-actions run trees/pick_and_place.yaml --sim --speed 10 --check-part 5.0
+	@$(BIN)/bt-actions runs --tree pick_and_place | sed -n '2s|^\(....\).*|look at it: $(BIN)/bt-actions view \1|p'
 
 test: lint types ## check the code and run every test
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal

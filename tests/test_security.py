@@ -21,9 +21,9 @@ PACKAGE = Path(__file__).parents[1] / "bt_actions"
 
 NEVER_CALLED = {"eval", "exec", "compile", "__import__", "system", "popen", "Popen", "check_output"}
 NEVER_IMPORTED = {"pickle", "marshal", "shelve", "subprocess", "pty", "dill"}
-RUNS_TOOLS = {room: {"Popen", "subprocess"} for room in ("packages", "recording")}
-"""`interfaces build` starts compilers and pip; a long recording is packed by another Python. No
-tree leads there."""
+RUNS_TOOLS = {room: {"Popen", "subprocess"} for room in ("packages", "recording", "page")}
+"""`interfaces build` starts compilers and pip; a long recording is packed, and the page served, by
+another Python. No tree leads there."""
 _numbers = itertools.count()
 
 

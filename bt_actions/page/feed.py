@@ -23,8 +23,9 @@ from bt_actions.events import (
     RunEnded,
 )
 from bt_actions.events.wire import to_plain
-from bt_actions.recording.folders import is_written
+from bt_actions.recording.folders import Summary, is_written, read_summary
 from bt_actions.recording.following import Follower
+from bt_actions.recording.unrecorded import unrecorded
 from bt_actions.story.actions import GoalStory
 from bt_actions.story.failures import Failure
 from bt_actions.story.state import State
@@ -52,7 +53,7 @@ async def told(
     Raises OSError, and ValueError for a file that is none of ours.
     """
     with Follower(first) as follower:
-        feed = _Feed(follower, after)
+        feed = _Feed(follower, run_id, after)
         beat, gone, last = 0.0, 0, None
         while not closing():
             now = time.monotonic()
@@ -60,6 +61,7 @@ async def told(
             if is_due:
                 beat = now
                 gone = 0 if await asyncio.to_thread(is_written, first) else gone + 1
+                await asyncio.to_thread(feed.ask)
             sent = False
             for_one = feed.batches()
             while (batch := await asyncio.to_thread(next, for_one, None)) is not None:
@@ -73,7 +75,7 @@ async def told(
                 last = follower.recording.last_beat
                 yield message("beat", feed.beat(is_written=not gone))
             if is_over:
-                yield message("end", {"to": feed.number, "ended": feed.ended})
+                yield message("end", await asyncio.to_thread(feed.end))
                 return
             await asyncio.sleep(POLL)
 
@@ -81,12 +83,34 @@ async def told(
 class _Feed:
     """One browser's place in a run."""
 
-    def __init__(self, follower: Follower, after: int) -> None:
-        self._follower = follower
+    def __init__(self, follower: Follower, run_id: str, after: int) -> None:
+        self._follower, self._run_id = follower, run_id
+        self._seen = 0.0
+        """When the latest event happened, in seconds since 1970."""
         self.number = after
         """Of the latest event that the browser was told."""
         self.ended = False
         """Whether the run was told to be over."""
+        self._unrecorded = ""
+        """Since when nothing of a run that goes on is recorded, and why, or ""."""
+
+    def ask(self) -> None:
+        """Ask whether the run goes on without being recorded."""
+        told = (str(each) for each in unrecorded() if each.summary.run_id == self._run_id)
+        self._unrecorded = next(told, "")
+
+    def end(self) -> dict[str, Any]:
+        """Return how the run ended, as far as that is known, and when it was last seen."""
+        recording = self._follower.recording
+        summary = read_summary(recording.first) or Summary("", "", 0.0)
+        seen = max(recording.last_beat or 0.0, self._seen)
+        return {
+            "to": self.number,
+            "ended": self.ended,
+            "ago": max(0.0, time.time() - seen),
+            "unrecorded": summary.unrecorded,
+            "outcome": summary.status,
+        }
 
     def beat(self, *, is_written: bool) -> dict[str, Any]:
         """Return what is known of the run's process."""
@@ -96,6 +120,7 @@ class _Feed:
             "tick": recording.tick,
             "written": is_written,
             "damaged": recording.damaged,
+            "unrecorded": self._unrecorded,
         }
 
     def batches(self) -> Iterator[dict[str, Any]]:
@@ -105,7 +130,10 @@ class _Feed:
         for item in self._follower.news():
             self.ended = self.ended or isinstance(item, RunEnded)
             at = item.now if isinstance(item, State) else item.at
-            if at is None or at.number <= self.number:
+            if at is None:
+                continue
+            self._seen = at.wall
+            if at.number <= self.number:
                 continue
             events.append(known(item) if isinstance(item, State) else to_plain(item))
             if isinstance(item, EventsLost):  # which has the number of what follows

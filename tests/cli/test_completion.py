@@ -92,6 +92,7 @@ def test_bash_completes_runs_by_id_and_by_tree() -> None:
         record([story.began, story.finish(Status.SUCCESS)])
     assert sorted(bash_completes("report ")) == ["aaaaaaaa", "bbbbbbbb", "deliver"]
     assert bash_completes("report b") == ["bbbbbbbb"]
+    assert sorted(bash_completes("watch ")) == ["aaaaaaaa", "bbbbbbbb", "deliver"]
 
 
 @pytest.mark.parametrize("line", ["", "run ", "run pick_and_place --set ", "explain ", "report "])

@@ -11,11 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from bt_actions.events import Event, RunBegan
+from bt_actions.events import Event
 from bt_actions.page import server
-from bt_actions.recording.folders import FIRST, Summary, folder_for, held, home, write_summary
-from bt_actions.recording.writing import RunWriter
+from bt_actions.page.guard import LOOPBACK, Place
+from bt_actions.page.standing import token
 from tests.support import browser as chromium
+from tests.support.recordings import Going
 
 ROOT = Path(__file__).parents[2]
 SETTLED = "window.page?.settled"
@@ -30,45 +31,39 @@ new PerformanceObserver((list) => { for (const one of list.getEntries()) shifts 
 class Served:
     """A server that can be stopped, and started again on its port."""
 
-    def __init__(self) -> None:
-        self.port = 0
+    def __init__(self, place: Place = LOOPBACK, idle: float | None = None) -> None:
+        self.port, self.token = 0, ""
+        self._place, self._idle = place, idle
         self.start()
 
     def start(self) -> None:
-        opened = server.listen(self.port)
+        opened = server.listen(self.port, self._place)
         self.port = opened.getsockname()[1]
-        self._server = server.server_of()
-        self._thread = threading.Thread(target=self._server.run, kwargs={"sockets": [opened]})
+        self._server, self.token = server.server_of(None, self._place, idle=self._idle), token()
+        self._thread = threading.Thread(
+            target=self._server.run, kwargs={"sockets": [opened]}, daemon=True
+        )
         self._thread.start()
+
+    @property
+    def address(self) -> str:
+        """What a user opens; more may follow behind a &."""
+        return f"http://127.0.0.1:{self.port}/#token={self.token}"
+
+    @property
+    def cookie(self) -> str:
+        """What a browser sends that has posted the token."""
+        return f"bt_actions_{self.port}={self.token}"
 
     def stop(self) -> None:
         self._server.should_exit = True
         self._thread.join(20.0)
-        assert not self._thread.is_alive()
+        assert not self.runs
 
-
-class Going:
-    """A run that is being written."""
-
-    def __init__(self, events: list[Event], **options: int) -> None:
-        began = next(each for each in events if isinstance(each, RunBegan))
-        self.first = folder_for(began.run_id, began.tree, began.at.wall, home()) / FIRST
-        self.writer = RunWriter(self.first, began, **options)  # type: ignore[arg-type]
-        self._lock = held(self.first, alone=True)
-        self._lock.__enter__()
-        self._goes_on = True
-        write_summary(self.first, Summary(began.run_id, began.tree, began.at.wall))
-
-    def write(self, events: list[Event]) -> None:
-        for event in events:
-            self.writer.add(event)
-        self.writer.flush()
-
-    def end(self) -> None:
-        if self._goes_on:
-            self._goes_on = False
-            self.writer.close()
-            self._lock.__exit__(None, None, None)
+    @property
+    def runs(self) -> bool:
+        """Whether it has not ended."""
+        return self._thread.is_alive()
 
 
 Begin = Callable[..., Going]
@@ -146,6 +141,8 @@ def page(window: chromium.Browser, served: Served) -> Iterator[Page]:
     """The page; the browser must have had nothing to complain about, nor asked another host."""
     window.complaints()
     shown = Page(window, served)
+    window.open(served.address)
+    assert window.wait_for("!location.hash.includes('token') && page.is_refused === false")
     yield shown
     asked = window.run("return performance.getEntriesByType('resource').map((one) => one.name)")
     assert asked

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import socket
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -14,8 +15,9 @@ import pytest
 from bt_actions.events import Event, EventsLost, FeedbackCame
 from bt_actions.events.wire import from_plain
 from bt_actions.page.feed import MOST
-from bt_actions.recording import reading
+from bt_actions.recording import reading, unrecorded
 from bt_actions.recording.finishing import finish
+from bt_actions.recording.folders import Summary, write_summary
 from bt_actions.recording.following import Follower
 from bt_actions.recording.reading import Item
 from bt_actions.story.state import State
@@ -88,7 +90,8 @@ def test_a_run_that_is_over_is_told_whole_and_its_end(served: Served) -> None:
     told = Told(served)
     assert texts(told.read()) == texts(events)
     assert told.has_no_gap
-    assert told.messages[-1] == ("end", {"to": events[-1].at.number, "ended": True})
+    kind, end = told.messages[-1]
+    assert (kind, end["to"], end["ended"]) == ("end", events[-1].at.number, True)
     assert told.latest_id == f"{RUN_ID}:{events[-1].at.number}"
 
 
@@ -97,7 +100,8 @@ def test_a_run_whose_process_was_killed_ends_without_an_end(served: Served) -> N
     record(events, killed=0.5, tick=14.0)
     told = Told(served)
     assert texts(told.read()) == texts(events)
-    assert told.messages[-1] == ("end", {"to": 9, "ended": False})
+    kind, end = told.messages[-1]
+    assert (kind, end["to"], end["ended"], end["unrecorded"]) == ("end", 9, False, "")
     (beat, *_) = [data for kind, data in told.messages if kind == "beat"]
     assert beat["clock"] == pytest.approx(events[-1].at.wall + 0.5)
     assert (beat["tick"], beat["written"]) == (14.0, False)
@@ -177,6 +181,7 @@ def test_a_heartbeat_tells_the_clock_of_the_run_and_how_long_its_tick_lasts(
         "tick": 0.0,
         "written": True,
         "damaged": 0,
+        "unrecorded": "",
     }
     at = events[-1].at
     run.writer.beat(at.steady + 14.0, at.wall + 14.0, at.ros, 13.5)
@@ -185,6 +190,35 @@ def test_a_heartbeat_tells_the_clock_of_the_run_and_how_long_its_tick_lasts(
     beat = told.messages[-1][1]
     assert beat["clock"] == pytest.approx(at.wall + 14.0)
     assert (beat["tick"], beat["written"]) == (13.5, True)
+
+
+def test_when_a_killed_run_was_last_seen_is_told(served: Served) -> None:
+    now = time.time() - 12.0
+    events = [replace(each, at=each.at._replace(wall=now)) for each in told_of()[:9]]
+    lived = events[-1].at.steady - events[1].at.steady  # on the steady clock, since RunBegan
+    record(events, killed=2.0)
+    told = Told(served)
+    told.read()
+    assert told.messages[-1][1]["ago"] == pytest.approx(12.0 - lived - 2.0, abs=2.0)
+
+
+def test_a_run_that_is_not_recorded_any_further_is_told_so_while_it_goes_on_and_afterwards(
+    served: Served, begin: Begin
+) -> None:
+    events = told_of()[:9]
+    run = begin(events)
+    run.write(events)
+    summary = Summary(RUN_ID, "all", 1.8e9)
+    with unrecorded.told(summary, 1.8e9, "the disk is full"):
+        told = Told(served)
+        told.read("beat")
+        since = unrecorded.since_text(1.8e9, "the disk is full")
+        assert told.messages[-1][1]["unrecorded"] == since
+    write_summary(run.first, replace(summary, status="SUCCESS", unrecorded=since))
+    run.end()
+    told.read()
+    _, end = told.messages[-1]
+    assert (end["ended"], end["unrecorded"], end["outcome"]) == (False, since, "SUCCESS")
 
 
 def test_where_files_are_missing_all_that_is_known_of_the_state_is_told(
@@ -232,7 +266,8 @@ def test_a_browser_that_stops_reading_has_no_more_read_for_it(
     with socket.socket() as silent:
         silent.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         silent.connect(("127.0.0.1", served.port))
-        silent.sendall(f"GET /run/{RUN_ID}/events HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        head = f"Host: localhost:{served.port}\r\nCookie: {served.cookie}\r\n\r\n"
+        silent.sendall(f"GET /run/{RUN_ID}/events HTTP/1.1\r\n{head}".encode())
         until(lambda: read[0])
         reader = Told(served)
         reader.read("beat")  # somebody else is told all of it meanwhile
@@ -248,7 +283,8 @@ def test_a_browser_that_stops_reading_does_not_keep_the_server_from_its_end(
     with socket.socket() as silent:
         silent.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         silent.connect(("127.0.0.1", served.port))
-        silent.sendall(f"GET /run/{RUN_ID}/events HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        head = f"Host: localhost:{served.port}\r\nCookie: {served.cookie}\r\n\r\n"
+        silent.sendall(f"GET /run/{RUN_ID}/events HTTP/1.1\r\n{head}".encode())
         assert silent.recv(100)
         Told(served).read("beat")  # by then there is no more room for what it does not read
         served.stop()

@@ -5,11 +5,14 @@ Skipped where there is no Chromium with its chromedriver.
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import pytest
 
 from bt_actions.events import Moment, RunBegan, TickLasts
+from bt_actions.recording import unrecorded
+from bt_actions.recording.folders import Summary, write_summary
 from tests.page.conftest import SETTLED, SHIFTS, Beating, Begin, Page, Served
 from tests.page.test_feed import told_of
 from tests.support import browser as chromium
@@ -210,9 +213,45 @@ def test_a_run_without_a_heartbeat_is_stale_and_its_clock_stands(page: Page, beg
     assert page.window.run("return page.t") == stood
     assert page.text("#why", "Last seen")
     run.end()  # and no end of the run is told: its process is gone
-    assert page.text("#conn", "Replay")
+    assert page.text("#conn", "Lost for")
     assert page.text("#status", "Never finished") == "Never finished"
     assert "was killed" in page.text("#banner", "The recording ends")
+    assert page.window.run("return page.t") == stood
+    assert "Last seen" in page.text("#why", "Last seen")
+
+
+def test_a_run_that_was_killed_is_lost_for_as_long_as_that_is_ago(page: Page) -> None:
+    now = time.time() - 100.0
+    record([replace(each, at=each.at._replace(wall=now)) for each in told_of()[:9]], killed=0.5)
+    page.open()
+    assert page.text("#conn", "Lost for").startswith("Lost for")
+    lived = 7 / 8 + 0.5
+    silence = page.window.run("return page.link.silence")
+    assert silence == pytest.approx(time.time() - now - lived, abs=3.0)
+    ends = "(page.run.info.wall + page.run.clock) * 1000"
+    when = page.window.run(f"return new Date({ends}).toLocaleString()")
+    assert f"The recording ends at 00:00.8, {when}" in page.text("#banner", "The recording ends")
+    assert page.text("#conn", "Lost for 101 s")
+
+
+def test_a_run_that_is_recorded_no_further_is_never_live(page: Page, begin: Begin) -> None:
+    events = told_of()[:7]
+    run = begin(events)
+    run.write(events)
+    beating = Beating(run, events)
+    summary = Summary(RUN_ID, "all", 1.8e9)
+    with unrecorded.told(summary, 1.8e9, "the disk is full"):
+        beating.stop()
+        page.open()
+        assert page.text("#conn", "Not recorded") == "Not recorded"
+        assert page.text("#status", "Not recorded") == "Not recorded"
+        said = page.text("#banner", "Not recorded since")
+        assert f"{unrecorded.since_text(1.8e9, 'the disk is full')}. As of 00:0" in said
+        assert "Last seen" in page.text("#why", "Last seen")
+    write_summary(run.first, replace(summary, status="SUCCESS", unrecorded="12:03:10: full"))
+    run.end()
+    assert "The run ended later: SUCCESS" in page.text("#banner", "The run ended later")
+    assert page.text("#conn", "Replay") == "Replay"
 
 
 def test_a_lost_server_comes_back_without_a_gap(page: Page, begin: Begin, served: Served) -> None:

@@ -15,6 +15,8 @@ from bt_actions.cli.arguments.options import add_option, metres, node_name
 from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters
 from bt_actions.cli.driving.record import add_options, recorder
 from bt_actions.cli.driving.sweep import sweep
+from bt_actions.cli.driving.viewing import add_option as add_view
+from bt_actions.cli.driving.viewing import show
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, starting_ros
 from bt_actions.cli.streams.results import keep_results_apart
 
@@ -89,6 +91,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "where --set does not",
     )
     add_options(parser, one_run=True)
+    add_view(parser)
     add_option(parser, "--publish-values")
     simulated = parser.add_argument_group("simulation")
     servers = simulated.add_mutually_exclusive_group()
@@ -135,6 +138,7 @@ def run(args: argparse.Namespace) -> int:
         parameters=(lambda tree: _given(args, tree)) if args.ros_args else None,
     )
 
+    show(args)
     cleans_up = args.cleanup_first and not is_simulated  # which is private
     servers = _servers(args, root) if cleans_up else []
     outlook = _outlook()  # early: it is to have seen other nodes when ours gets its name

@@ -17,6 +17,8 @@ from bt_actions.cli.arguments.ros_arguments import add_ros_args, parameters, tak
 from bt_actions.cli.driving.record import add_options, recorder
 from bt_actions.cli.driving.serving import say, serve
 from bt_actions.cli.driving.sweep import sweep
+from bt_actions.cli.driving.viewing import add_option as add_view
+from bt_actions.cli.driving.viewing import show
 from bt_actions.cli.exits import BadInput, Exit, importing_ros, leave, refuse_domain
 from bt_actions.cli.streams.writing import note
 from bt_actions.utilities.suggest import listing
@@ -80,6 +82,7 @@ def add_parser(subparsers: Subparsers) -> None:
         help="namespace of the node, and thereby of run_tree and every relative action name",
     )
     add_options(parser, one_run=False)
+    add_view(parser)
     add_option(parser, "--publish-values")
     more = f"; the parameters {listing(_HELP)} are used where the options are not given"
     add_ros_args(parser, more)
@@ -91,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
     what = "parameter of bt-actions serve"
     options = _options(args, taken(given, _HELP, what, other_users=True))
     records = recorder(args)
+    show(args, "runs")
     code = _clean_up()
     if code is not Exit.SUCCESS:
         return code

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.arguments.options import number
+from bt_actions.cli.driving.viewing import need_page
 from bt_actions.cli.exits import BadInput, Exit
 from bt_actions.cli.streams.writing import write
 
@@ -19,10 +21,12 @@ examples:
   bt-actions view 96399112                       # the first letters of an id: `bt-actions runs`
   bt-actions view monday.mcap
 from another computer:
-  ssh -L 8650:127.0.0.1:8650 ROBOT bt-actions view
+  ssh -L 8650:127.0.0.1:8650 ROBOT bt-actions view --port 8650
+  bt-actions view --host robot.example --certificate robot.pem    # on ROBOT, for the network
 
 The page reads recordings, and only reads: it cannot pause or halt a run. A run goes on as if nobody
-looked. Ctrl-C stops the page's server.
+looked. The address holds a token that opens the runs of this user to whoever has it. Ctrl-C stops
+the page's server.
 """
 
 
@@ -31,8 +35,8 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser(
         "view",
         help="show a run on a page, live or from its recording",
-        description="Serve a page, to browsers of this computer alone, that shows a run: what runs "
-        "and waits, why it failed, and all that happened. Its address is the one line of output.",
+        description="Serve a page that shows a run, to browsers of this computer: what runs and "
+        "waits, why it failed, and all that happened. Its address is the one line of output.",
         epilog=_EPILOG,
     )
     parser.add_argument(
@@ -46,35 +50,52 @@ def add_parser(subparsers: Subparsers) -> None:
         "--port",
         metavar="N",
         type=number("port: 1 to 65535", int, 1, 65535),
-        help="port on 127.0.0.1 [8650, or the next free one]",
+        help="port [8650, or the next free one]",
     )
     parser.add_argument("--open", action="store_true", help="open the page in a browser, too")
+    parser.add_argument(
+        "--host",
+        metavar="NAME",
+        help="name or address under which other computers reach this one; needs --certificate",
+    )
+    parser.add_argument(
+        "--certificate", metavar="FILE", type=Path, help="certificate of that host, as PEM"
+    )
+    parser.add_argument(
+        "--key", metavar="FILE", type=Path, help="its private key, where FILE does not hold that"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Serve the page until somebody stops it."""
     from bt_actions.recording.folders import NoRun, find
 
-    try:
-        from bt_actions.page import server
-    except ModuleNotFoundError as error:
-        missing = (error.name or "").partition(".")[0]
-        if missing not in ("starlette", "uvicorn"):
-            raise
-        remedy = "pip install 'bt_actions[view]'"
-        raise BadInput(f"the page needs {missing}, which is not installed: {remedy}") from error
+    need_page()
+    from bt_actions.page import server, standing
+    from bt_actions.page.guard import LOOPBACK, Place
+
+    if (args.certificate is None) != (args.host is None):
+        raise BadInput("--host and --certificate go together: the page leaves this computer by TLS")
+    place = LOOPBACK if args.host is None else Place(args.host, args.certificate, args.key)
     try:
         given = find(args.run) if args.run else None
-        opened = server.listen(args.port)
+        opened = server.listen(args.port, place)
+        served = server.server_of(given, place)
+        address = server.address_of(opened, place)
+        shown = standing.opening(address, "" if given is None else f"run={server.id_of(given)}")
+        with standing.registered(address):
+            write(f"{shown}\n")
+            if args.open:
+                import webbrowser
+
+                webbrowser.open(shown)
+            served.run(sockets=[opened])
     except NoRun as error:
         raise BadInput(str(error)) from error
     except server.NoPort as error:
         raise BadInput(f"{error}: give another one with --port") from error
-    address = server.address(opened, given)
-    write(f"{address}\n")
-    if args.open:
-        import webbrowser
-
-        webbrowser.open(address)
-    server.server_of(given).run(sockets=[opened])
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise BadInput(f"the page cannot be served: {error}") from error
     return Exit.SUCCESS

@@ -2,7 +2,7 @@
 
 import { el } from "./dom.js";
 import { status_glyph } from "./glyphs.js";
-import { clock, STATE } from "./words.js";
+import { clock, span, STATE } from "./words.js";
 
 const find = (id) => document.getElementById(id);
 const text = (node, value) => {
@@ -46,6 +46,19 @@ export function create_head(app) {
         return option;
       }),
     );
+    const all_runs = () => {
+      shut(true);
+      location.hash = "#runs";
+    };
+    if (!app.is_stored)
+      runs.append(
+        el(
+          "button",
+          { class: "opt", role: "option", "aria-selected": "false", onclick: all_runs },
+          el("span"),
+          el("b", { text: "All runs" }),
+        ),
+      );
     runs.hidden = false;
     opener.setAttribute("aria-expanded", "true");
     (runs.querySelector("[aria-selected=true]") || runs.firstChild)?.focus();
@@ -71,6 +84,7 @@ export function create_head(app) {
     if (s.finished?.error && !s.stop) return STATE.failure;
     if (s.finished)
       return { SUCCESS: STATE.success, FAILURE: STATE.failure, INVALID: ["Stopped", "stopped"] }[s.finished.status];
+    if (app.at_head && link.unrecorded) return ["Not recorded", "stopped"];
     if (over && !link.ended && !link.goes_on) return ["Never finished", "stopped"];
     if (s.paused) return ["Paused", "waiting"];
     if (s.stop) return ["Stopping", "cancel"];
@@ -104,6 +118,7 @@ export function create_head(app) {
     text(find("elapsed"), clock(app.t));
     const conn = find("conn"),
       ago = Math.floor(link.silence),
+      lost = `Lost ${small ? "" : "for "}${span(link.silence)}`,
       of = small ? "" : "for ",
       { conn: now } = link;
     if (conn.dataset.conn !== now) {
@@ -113,12 +128,16 @@ export function create_head(app) {
     }
     text(
       conn.lastChild,
-      { live: "Live", stale: `Stale ${of}${ago} s`, lost: `Lost ${of}${ago} s`, replay: "Replay" }[now],
+      { live: "Live", stale: `Stale ${of}${ago} s`, unrecorded: "Not recorded", lost, gone: lost, replay: "Replay" }[
+        now
+      ],
     );
     conn.title = {
       live: "Events come",
       stale: "Nothing has come from the run, not even a heartbeat",
+      unrecorded: "The run goes on, and what happens is not recorded",
       lost: "The connection is gone; what is shown is what was last known",
+      gone: "The process of the run was killed; what is shown is what was last known",
       replay: "Nothing more comes; this is the record",
     }[now];
     banner(now, ago);
@@ -127,11 +146,17 @@ export function create_head(app) {
   function banner(now, ago) {
     const { run, link } = app,
       box = find("banner");
-    const killed = now === "replay" && !link.ended && !link.goes_on && run.began ? "killed" : "",
+    const killed = now === "gone",
       broken = link.why ? "lost" : "";
     const tone =
       broken ||
-      (killed || link.goes_on ? "stale" : now === "stale" || now === "lost" ? now : link.damaged ? "stale" : "");
+      (killed || link.unrecorded || link.goes_on
+        ? "stale"
+        : now === "stale" || now === "lost"
+          ? now
+          : link.damaged
+            ? "stale"
+            : "");
     if (box.dataset.k !== tone + now) {
       box.dataset.k = tone + now;
       box.className = tone;
@@ -150,15 +175,17 @@ export function create_head(app) {
       ? `The recording cannot be read: ${link.why}`
       : link.goes_on
         ? `Written while the run went on, at ${clock(run.clock)}.${hurt}`
-        : killed
-          ? `The recording ends at ${clock(run.clock)}: its process was killed, and what ran then may still run.${hurt}`
-          : hurt && !["stale", "lost"].includes(now)
-            ? `The recording:${hurt}`
-            : now === "lost"
-              ? `${last}; ${next ? `next try in ${next} s` : "trying"}. What is missed is filled in.`
-              : link.tick > 2
-                ? `${last}: the tick of the tree lasts for ${Math.floor(link.tick + ago)} s.`
-                : `${last}: nothing has come since, not even a heartbeat.`;
+        : link.unrecorded
+          ? `Not recorded since ${link.unrecorded}. ${link.outcome ? `The run ended later: ${link.outcome}.` : `${last}.`}`
+          : killed
+            ? `The recording ends at ${clock(run.clock)}, ${when(run.info.wall + run.clock)}: its process was killed, and what ran then may still run.${hurt}`
+            : hurt && !["stale", "lost"].includes(now)
+              ? `The recording:${hurt}`
+              : now === "lost"
+                ? `${last}; ${next ? `next try in ${next} s` : "trying"}. What is missed is filled in.`
+                : link.tick > 2
+                  ? `${last}: the tick of the tree lasts for ${Math.floor(link.tick + ago)} s.`
+                  : `${last}: nothing has come since, not even a heartbeat.`;
     text(box.firstChild, words);
     box.title = words;
   }

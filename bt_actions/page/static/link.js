@@ -1,7 +1,8 @@
 // The stream of one run: keeps it open, goes on where it was, and says how well it is known that the run lives.
 //
-// `conn`: "live", "stale" (the stream is there, the run's heartbeat is not), "lost" (no stream), "replay" (the run is
-// over, or its process is gone). No time is made up: `head` goes on for at most AHEAD seconds behind a sign of life.
+// `conn`: "live", "stale" (the stream is there, the run's heartbeat is not), "unrecorded" (the run goes on, and nothing
+// of that is recorded), "lost" (no stream), "gone" (the run's process is), "replay" (the run is over). No time is made
+// up: `head` goes on for at most AHEAD seconds behind a sign of life.
 
 const STALE = 2.5,
   AHEAD = 1.2,
@@ -18,6 +19,8 @@ export class Link {
       tick: 0,
       damaged: 0,
       why: "",
+      unrecorded: "",
+      outcome: "",
       head: 0,
       signed: performance.now(),
       last_beat: null,
@@ -41,11 +44,11 @@ export class Link {
       this.sign(run.clock);
     });
     source.addEventListener("beat", ({ data }) => {
-      const { clock, tick, damaged } = JSON.parse(data);
+      const { clock, tick, damaged, unrecorded } = JSON.parse(data);
       this.tries = 0;
       this.tick = tick;
       this.is_open = true;
-      this.damaged = damaged;
+      Object.assign(this, { damaged, unrecorded });
       if (clock !== null && clock !== this.last_beat && run.began) {
         this.last_beat = clock;
         this.sign(Math.max(run.clock, clock - run.began[2]));
@@ -54,10 +57,12 @@ export class Link {
       this.told("settled");
     });
     source.addEventListener("end", ({ data }) => {
-      this.ended = JSON.parse(data).ended;
+      const { ended, ago, unrecorded, outcome } = JSON.parse(data);
       run.over = true;
       this.close();
-      this.set("replay");
+      Object.assign(this, { ended, outcome, unrecorded: unrecorded || this.unrecorded });
+      this.signed = performance.now() - ago * 1000;
+      this.set(ended || this.unrecorded ? "replay" : "gone");
     });
     source.addEventListener("reset", () => this.told("reset"));
     source.addEventListener("broken", ({ data }) => {
@@ -86,6 +91,13 @@ export class Link {
     clearTimeout(this.retry);
     this.source?.close();
   }
+  // A page that is not seen keeps no stream; when it is seen again, what was missed comes first.
+  hide(hidden) {
+    if (this.run.over) return;
+    this.close();
+    this.is_open = false;
+    if (!hidden) this.open();
+  }
 
   // Something of the run was seen: its clock stood at t then.
   sign(t) {
@@ -99,14 +111,14 @@ export class Link {
   // Once a frame.
   look() {
     const { run } = this;
+    this.silence = (performance.now() - this.signed) / 1000;
     if (run.over) {
       this.head = run.clock;
       return;
     }
-    this.silence = (performance.now() - this.signed) / 1000;
     if (this.base !== undefined)
       this.head = Math.max(this.head, run.clock, this.base + Math.min(AHEAD, this.is_open ? this.silence : 0));
-    this.set(!this.is_open ? "lost" : this.silence > STALE ? "stale" : "live");
+    this.set(!this.is_open ? "lost" : this.unrecorded ? "unrecorded" : this.silence > STALE ? "stale" : "live");
   }
   set(conn) {
     if (this.conn !== conn) {

@@ -1,7 +1,7 @@
 // The page: one clock, one selection, one time that all panes show. Panes read `app` and never write to each other.
 // Everything is painted in one frame, when something has changed, and not otherwise.
 //
-// Address: #run=ID &t= &node= &tab= &pane= &view=
+// Address: #runs, or #run=ID &t= &node= &tab= &pane= &view=
 
 import { Run } from "./store.js";
 import { Link } from "./link.js";
@@ -16,6 +16,7 @@ import { create_details } from "./details.js";
 import { create_values } from "./values.js";
 import { create_log } from "./log.js";
 import { show_none } from "./other.js";
+import { Front } from "./front.js";
 import { toast, dress, splitters } from "./dress.js";
 import { listen } from "./keys.js";
 import { ways } from "./ways.js";
@@ -26,7 +27,7 @@ const PAINT = 32;          // milliseconds between two paintings, at least
 const MORE = 300_000;     // events that come to a page before it begins anew with what is recorded by then, which is bounded
 
 const app = {
-  run: new Run(), link: null, s: null, t: 0, head: 0, at_head: true, playing: false, speed: 1, settled: false, grown: 0,
+  run: new Run(), link: null, is_stored: Boolean(stored), s: null, t: 0, head: 0, at_head: true, playing: false, speed: 1, settled: false, grown: 0,
   sel: 0, pane: "tree", tab: "details", view: "outline", follow: true, squeeze: true, zoomed: null, folded: new Set(), narrow, more: MORE, first: 0,
   touch() { dirty = true; },
   remember() { clearTimeout(writing); writing = setTimeout(() => history.replaceState(null, "", `#${params_now()}`), 250); },
@@ -50,15 +51,24 @@ const app = {
   go_live() { app.t = app.head; app.at_head = true; app.playing = false; panes.tree.rewind(); app.remember(); dirty = true; },
   let_go() { if (app.follow) app.set_follow(false); },
   set_follow(on) { app.follow = on; find("follow").setAttribute("aria-pressed", on); },
-  async fetch_runs() { if (stored) return stored.map((one) => one.run); try { return (await (await fetch("/runs")).json()).runs; } catch { return []; } },
+  async fetch_runs() {
+    if (stored) return stored.map((one) => one.run);
+    try {
+      const answer = await fetch("/runs");
+      app.is_refused = answer.status === 401;
+      return (await answer.json()).runs;
+    } catch { return []; }
+  },
   open(id, params = new URLSearchParams()) {
+    front?.close();
+    front = null;
     app.link?.close();
     Object.assign(app, { run: new Run(id), s: null, settled: false, grown: 0, t: 0, head: 0, at_head: true, playing: false, zoomed: null, folded: new Set(), wanted: params });
     const { run } = app;
     app.link = new (stored ? Stored : Link)(run, (what) => told(run, what));
   },
 };
-let dirty = true, last = performance.now(), painted = 0;
+let dirty = true, last = performance.now(), painted = 0, front = null;
 const panes = { head: create_head(app), strip: create_strip(app), tree: create_tree(app), graph: create_graph(app), timeline: create_timeline(app), details: create_details(app), values: create_values(app), log: create_log(app), transport: create_transport(app) };
 Object.assign(app, ways(app, panes));
 window.page = app;    // for tests, and for the curious
@@ -131,24 +141,46 @@ function params_now() {
 }
 let writing = 0;
 
+// The token of the address is changed for a cookie, and does not stay in the address.
 async function enter() {
-  const params = new URLSearchParams(location.hash.slice(1));
-  if (params.has("run")) return app.open(params.get("run"), params);
-  const runs = await app.fetch_runs(), [newest] = runs, live = runs.find((one) => one.written && !one.status);
-  if (newest) return app.open((!stored && live || newest).run_id, params);
-  none();
+  const params = new URLSearchParams(location.hash.slice(1)), token = params.get("token");
+  if (token) {
+    params.delete("token");
+    history.replaceState(null, "", `#${params}`);
+    try { await fetch("/enter", { method: "POST", body: token }); } catch { /* the runs are not to be had, either */ }
+  }
+  const runs = await app.fetch_runs(), [newest] = runs, going = runs.filter((one) => one.written && !one.status);
+  if (!stored && !app.is_refused && (params.has("runs") || (!params.has("run") && going.length > 1))) return show_front();
+  if (!app.is_refused && params.has("run")) return app.open(params.get("run"), params);
+  if (newest) return app.open((!stored && going[0] || newest).run_id, params);
+  if (app.is_refused) none("This address lacks its end", "It ends in #token= and letters, as bt-actions view and run --view print it."); else none();
   setTimeout(enter, 1000);
 }
-function none(words) {
+// A card for each run, and the recordings.
+function show_front() {
+  clearTimeout(writing);
+  app.link?.close();
+  Object.assign(app, { link: null, settled: false });
+  document.body.dataset.state = "front";
+  find("tree-name").textContent = "All runs";
+  find("tree-where").textContent = "";
+  find("title").textContent = "All runs";
+  find("other").hidden = false;
+  front ??= new Front(app, find("other"));
+}
+function none(words, more) {
   document.body.dataset.state = "empty";
   find("other").hidden = false;
-  show_none(find("other"), words);
+  show_none(find("other"), words, more);
 }
 
 dress(app);
 splitters(app, panes);
 listen(app, panes);
 addEventListener("hashchange", enter);
+// A browser has six connections to a server at a time: a tab that nobody sees keeps none.
+document.addEventListener("visibilitychange", () => (front || app.link)?.hide?.(document.hidden));
 addEventListener("resize", () => { if (app.settled) panes.tree.layout(); dirty = true; });
+setInterval(() => app.fetch_runs(), 60_000);    // the server of run --view ends when no page has asked for anything for long
 enter();
 requestAnimationFrame(frame);

@@ -10,6 +10,8 @@ export class Stored {
     if (one) {
       for (const e of one.events) run.push(e);
       Object.assign(this, { ended: one.ended, goes_on: one.run.written, damaged: one.damaged, head: run.clock });
+      if (!this.ended && !this.goes_on)
+        Object.assign(this, { conn: "gone", silence: Date.now() / 1000 - run.began[2] - run.clock });
     } else this.why = "This file holds no such run";
     setTimeout(() => told("settled"));
   }

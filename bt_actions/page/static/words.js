@@ -13,6 +13,14 @@ export const secs = (s) =>
     : s < 0.0995
       ? `${Math.round(s * 1000)} ms`
       : `${s.toFixed(1)} s`;
+export const span = (s) =>
+  s < 120
+    ? `${Math.floor(s)} s`
+    : s < 7200
+      ? `${Math.floor(s / 60)} min`
+      : s < 172_800
+        ? `${Math.floor(s / 3600)} h`
+        : `${Math.floor(s / 86_400)} days`;
 export const plain = (s) => (s === null || s === undefined ? "none" : `${+s.toFixed(2)} s`);
 // Values, as bt_actions/events/wire.py writes them.
 export const short = (value) =>

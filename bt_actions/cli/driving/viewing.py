@@ -1,0 +1,44 @@
+"""The page beside a command: `--view` has this user's view show what the command records."""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import os
+
+from bt_actions.cli.driving.record import VARIABLE
+from bt_actions.cli.exits import BadInput
+from bt_actions.cli.streams.writing import note
+
+
+def add_option(parser: argparse.ArgumentParser) -> None:
+    """Add `--view`."""
+    parser.add_argument(
+        "--view",
+        action="store_true",
+        help="print the address of this user's page; where no `bt-actions view` runs, one is "
+        "started, which ends when nobody has looked for ten minutes",
+    )
+
+
+def need_page() -> None:
+    """Raise BadInput where what serves the page is not installed."""
+    for name in ("starlette", "uvicorn"):
+        if importlib.util.find_spec(name) is None:
+            remedy = "pip install 'bt_actions[view]'"
+            raise BadInput(f"the page needs {name}, which is not installed: {remedy}")
+
+
+def show(args: argparse.Namespace, shown: str = "") -> None:
+    """Print where the page is, if that is wanted; raise BadInput where it cannot be had."""
+    if not args.view:
+        return
+    if args.no_record or args.record is not None or os.environ.get(VARIABLE) == "off":
+        raise BadInput("--view shows runs that are recorded where `bt-actions runs` finds them")
+    need_page()
+    from bt_actions.page import standing
+
+    try:
+        note(f"look at it: {standing.opening(standing.shown(), shown)}")
+    except OSError as error:
+        raise BadInput(f"--view: {error}") from error
