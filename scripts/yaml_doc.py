@@ -22,6 +22,7 @@ from bt_actions.document.language.keys import (
     GATES,
     INPUT,
     OUTPUT,
+    OWN_KIND,
     RETRY,
     SERVICE_RETRY,
     SERVICE_TIMEOUT,
@@ -168,7 +169,7 @@ The key is a name under `actions`, its value the node's name.
 """
 ALIAS_EXAMPLE = "move: To the part\ngoal: {distance: 2.0}\nretry: 3"
 IMPORT = """\
-`actions`, `topics` and `defaults` from other files. They are found as subtrees are: below.
+`actions`, `topics`, `kinds` and `defaults` from other files. They are found as subtrees are: below.
 A `$name` in them is a variable of the tree that uses them, and is checked there."""
 WHERE = """\
 ## Where trees are found
@@ -217,6 +218,12 @@ QOS = """\
 A subscription that asks for more than its publisher offers hears nothing: `default` and `latched`
 of a best effort publisher, `latched` of one that keeps nothing.
 """
+OWN_KINDS = """\
+Classes of one's own, used as kinds: `shorten: A metre` with `with: {path: $path}`, `save: {short:
+path}`, and `child` or `children`. A class is a behaviour of py_trees that is made with its name,
+and its `child` or `children`. It reads `self.inputs.path`, which is computed when it is read, and
+sets `self.outputs.path`; what it has set is written when its visit ends, all or none. Where an
+input has no value, or an output does not fit, the node fails."""
 TOPICS = """\
 The latest message of a topic, read as a variable. While the first one may still be on its way (the
 process is younger than 3.5 s, or subscribed less than a second ago to a publisher that is there), a
@@ -354,6 +361,7 @@ def yaml_page() -> str:
     )  # fmt: skip
     lines += record("`topics`", TOPICS, TOPIC)
     lines += [example("topics"), ""]
+    lines += record("`kinds`", OWN_KINDS, OWN_KIND)
     lines += part("`import`", IMPORT, "words", "imports")
     lines += part("`defaults`", DEFAULTS, "defaults")
     lines += part("`namespace`", NAMESPACE, "namespaces")

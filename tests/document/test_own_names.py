@@ -63,7 +63,8 @@ def places_in(shape: Shape, where: Where) -> Iterator[tuple[Where, Shape]]:
 
 def all_places() -> Iterator[tuple[str | None, Where, Shape]]:
     """The kind of the node, or None at the top of a document, and the way from there."""
-    yield from ((None, where, shape) for where, shape in places(TOP_KEYS))
+    top = {name: key for name, key in TOP_KEYS.items() if name != "kinds"}  # which read nothing
+    yield from ((None, where, shape) for where, shape in places(top))
     for kind in KINDS.values():
         keys = {kind.name: Key(kind.name, kind.value, ""), **kind.keys}
         yield from ((kind.name, where, shape) for where, shape in places(keys))

@@ -26,11 +26,20 @@ from bt_actions.document.language.values import (
     computed_in,
     locate,
 )
-from bt_actions.document.reading.tree import Declared, TreeNode, merged, settings_of, when_of
+from bt_actions.document.reading.tree import (
+    Declared,
+    TreeNode,
+    merged,
+    settings_of,
+    table_of,
+    when_of,
+)
 from bt_actions.document.yaml.nodes import Mapping, span_of
 from bt_actions.document.yaml.source import Source
 from bt_actions.messages.conversion import Problem, examine
 from bt_actions.messages.fields import FieldType, Message
+
+_PLAIN = "a default is a plain value: it can read nothing"
 
 
 def check_document(checker: Checker) -> None:
@@ -93,6 +102,12 @@ def _check_declarations(checker: Checker) -> None:
         default = declared.values.get("default", BAD)
         if default is not BAD:
             _check_default(checker, declared, default)
+    for own in document.kinds.values():
+        for key in ("inputs", "outputs"):
+            for name, each in table_of(own.values.get(key)).items():
+                _check_type(checker, own, name, table_of(each).get("type"))
+                for computed in computed_in(table_of(each).get("default")):
+                    checker.source.report("BT204", span_of(computed.node), _PLAIN)
     for declared in document.topics.values():
         if "default" in declared.values and declared.source is checker.source:
             kind = checker.variables.get(declared.name)
@@ -114,12 +129,19 @@ def _declared_type(checker: Checker, declared: Declared, *, topic: bool) -> Fiel
         return None
 
 
+def _check_type(checker: Checker, own: Declared, name: str, text: object) -> None:
+    try:
+        parse_type(str(text), types=checker.types)
+    except TypeNameError as error:
+        if isinstance(text, str) and own.source is checker.source:
+            code = "BT205" if error.missing else "BT207"
+            checker.source.report(code, span_of(own.key), f"{name}: {error}")
+
+
 def _check_default(checker: Checker, declared: Declared, default: object) -> None:
     node = declared.written("default")
     for computed in computed_in(default):
-        checker.source.report(
-            "BT204", span_of(computed.node), "a default is a plain value: it can read nothing"
-        )
+        checker.source.report("BT204", span_of(computed.node), _PLAIN)
         return
     kind = checker.variables.get(declared.name)
     if kind is not None:

@@ -222,12 +222,22 @@ class Checker:
         except TypeNameError:
             return None
 
+    def output_type(self, node: TreeNode, name: object) -> FieldType | None:
+        """The type of an output of a kind of one's own; None where it has none."""
+        outputs = table_of(self.document.kinds[node.key.text].values.get("outputs"))
+        try:
+            return parse_type(str(table_of(outputs.get(str(name))).get("type")), types=self.types)
+        except TypeNameError:
+            return None
+
     def _type_of(self, write: Write) -> FieldType | None:
         """The type of what is written, without reporting anything."""
         node, value = write.node, write.value
         if node.kind.includes:
             outputs = node.included.outputs if node.included is not None else {}
             return self.declared_type(outputs.get(str(value)))
+        if node.key.text in self.document.kinds and node.alias is None:
+            return self.output_type(node, value)
         if write.root == "item of" and isinstance(value, list):
             return common_type([type_of_literal(item) for item in value])
         if isinstance(value, Interpolated):

@@ -72,8 +72,7 @@ class Hazards:
         while stack:
             node, inside, around = stack.pop()
             kind = node.kind
-            if node.alias is not None:
-                self._used.add(node.alias)
+            self._used.add(node.alias or node.key.text)
             if node.is_action and not inside:
                 self._look_at_action(node)
             if node.is_action:
@@ -235,6 +234,10 @@ class Hazards:
             if name not in self._used and not doubts.unknown_action and not doubts.mentions(name):
                 key = document.actions[name].key
                 self._report("BT309", span_of(key), f"no node uses the action {name!r}")
+        for name in self._own(document.kinds):
+            if name not in self._used and not doubts.unknown_action and not doubts.mentions(name):
+                key = document.kinds[name].key
+                self._report("BT309", span_of(key), f"no node is of the kind {name!r}")
         for name, declared in document.outputs.items():
             given = name in written or name in document.inputs
             if not given and not doubts.unknown_action and not doubts.mentions(name):

@@ -18,6 +18,7 @@ from collections.abc import Mapping as MappingType
 from bt_actions.document.findings import DocumentError, Span
 from bt_actions.document.kinds import KINDS
 from bt_actions.document.language.keys import ACTION_KEYS, NODE, NODES, TOP_KEYS, ConditionOrNode
+from bt_actions.document.language.kinds import OWN_KINDS
 from bt_actions.document.language.scalars import Shape
 from bt_actions.document.language.shapes import Key, ListOf, OneOf, Record, Table
 from bt_actions.document.yaml.compose import compose, compose_written
@@ -394,7 +395,8 @@ def _node_shapes(names: list[str]) -> MappingType[str, Shape | None]:
         kinds = [name for name in kinds if name not in ACTION_KEYS]
     held = {name for kind in kinds for name in KINDS[kind].holds if name != kind}
     kinds = [name for name in kinds if name not in held]
-    foreign = [name for name in names if name not in ACTION_KEYS]
+    own = {**OWN_KINDS["one"].keys, **OWN_KINDS["many"].keys}
+    foreign = [name for name in names if name not in ACTION_KEYS and name not in own]
     if len(kinds) == 1:
         kind = KINDS[kinds[0]]
         rest = _forms(kind.keys)
@@ -402,7 +404,9 @@ def _node_shapes(names: list[str]) -> MappingType[str, Shape | None]:
         last = {name: rest.pop(name) for name in kind.holds if name in rest}
         return ordered | rest | last
     if len(foreign) == 1:
-        return {foreign[0]: None, **_forms(ACTION_KEYS)}
+        forms = {**_forms(ACTION_KEYS), **_forms(own)}
+        last = {name: forms.pop(name) for name in ("child", "children")}
+        return {foreign[0]: None, **forms, **last}
     return dict.fromkeys(names)
 
 

@@ -31,7 +31,8 @@ from bt_actions.document.kinds.leaves import (
     wait_for_message,
     wait_until,
 )
-from bt_actions.document.language.kinds import KINDS, register
+from bt_actions.document.kinds.own import OWN
+from bt_actions.document.language.kinds import KINDS, OWN_KINDS, register
 
 __all__ = ["KINDS"]
 
@@ -44,3 +45,4 @@ register(
     *(each.KIND for each in (wait_until, set_, log, python, check, subtree)),
     *fixed.KINDS,
 )
+OWN_KINDS.update(OWN)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         decorators,
         leaves,
         leaving,
+        own,
         parallel,
         reading,
         run_tree,
@@ -49,10 +50,10 @@ else:
             "reading", "run_tree", "service",
         )
     )  # fmt: skip
-    topics = _Later("bt_actions.behaviours.topics")
+    own, topics = (_Later(f"bt_actions.behaviours.{name}") for name in ("own", "topics"))
 
 __all__ = [
     "Behaviour", "Checker", "Context", "Hazards", "TreeNode", "action", "build", "composites",
-    "decorators", "leaves", "leaving", "parallel", "parts", "py_trees", "reading", "run_tree",
-    "service", "topics",
+    "decorators", "leaves", "leaving", "own", "parallel", "parts", "py_trees", "reading",
+    "run_tree", "service", "topics",
 ]  # fmt: skip

@@ -159,12 +159,25 @@ TOPIC = Record(
         Key("namespace", NAMESPACE, "Put before a relative topic name."),
     ),
 )  # fmt: skip
+OWN_KIND = Record(
+    "a kind: its class",
+    keyed(
+        Key("python", Text("a class, such as package.module.Class, as a text"),
+            "A behaviour of py_trees, made with its name and what it holds.", required=True,
+            example="my_robot.paths.Shorten"),
+        Key("inputs", Table(INPUT), "What it reads as `self.inputs.name`, computed when read."),
+        Key("outputs", Table(OUTPUT), "What it sets as `self.outputs.name`, written at its end."),
+        Key("children", Choice(("none", "one", "many")), "What it holds.", default="none"),
+    ),
+    short="python",
+)  # fmt: skip
 DEFAULTS = Record("a mapping of settings", keyed(*POLICIES))
 _DESCRIPTION = Key("description", Text(), "What it is for.")
 _IMPORT = Key("import", ListOf(Text("a path, as a text"), single=True), "Files with more of these.")
 _SHARED = (
     Key("actions", Table(ALIAS), "This tree's words for the actions it uses."),
     Key("topics", Table(TOPIC), "Latest values, read as `$name.field`; missing ones fail a check."),
+    Key("kinds", Table(OWN_KIND), "Kinds of nodes of one's own."),
     Key("defaults", DEFAULTS, "Settings for all actions that do not say otherwise."),
 )
 

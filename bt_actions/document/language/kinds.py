@@ -185,6 +185,8 @@ _CHILD = Key("child", NODE, "The node it holds.", required=True, example="{succe
 
 KINDS: dict[str, Kind] = {}
 """Every kind of node, by its key; filled by `document/kinds/`, and never changed meanwhile."""
+OWN_KINDS: dict[str, Kind] = {}
+"""What a kind that a tree declares is made of, by the children that it holds."""
 NODE_KEYS = {*ACTION_KEYS, "child", "children"}
 """All that may stand in a node beside its kind, and so names no action.
 
@@ -228,3 +230,9 @@ def leaf(name: str, value: Shape, doc: str, example: str, *keys: Key, **more: An
     own = keyed(*keys, *(() if isinstance(value, NodeName) else (NAME,)))
     more.setdefault("reads", more["interface"].fields if "interface" in more else name)
     return Kind(name, Group.LEAF, value, doc, own, example, **more)
+
+
+def own_kind(name: str, children: str) -> Kind:
+    """A kind that a tree declares; `children` are none, one or many."""
+    made = OWN_KINDS.get(children, OWN_KINDS["none"])
+    return replace(made, name=name, keys={**made.keys, **GATES})

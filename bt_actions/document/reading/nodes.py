@@ -12,12 +12,12 @@ from itertools import chain
 from bt_actions.document.findings import Place, Related
 from bt_actions.document.findings.elsewhere import key_here, kind_here
 from bt_actions.document.language.keys import ACTION_KEYS
-from bt_actions.document.language.kinds import KINDS, NODE_KEYS, Group, Interface
+from bt_actions.document.language.kinds import KINDS, NODE_KEYS, Group, Interface, own_kind
 from bt_actions.document.language.scalars import Name, is_computed, words_for, wrong_form
 from bt_actions.document.language.shapes import Key, Table, report_unknown_key
 from bt_actions.document.language.types import interface_of
 from bt_actions.document.language.values import BAD
-from bt_actions.document.reading.tree import Document, TreeNode
+from bt_actions.document.reading.tree import Document, TreeNode, text_of
 from bt_actions.document.reading.unread import Doubts
 from bt_actions.document.yaml.nodes import (
     Listing,
@@ -54,7 +54,11 @@ class _Reader:
     def __init__(self, document: Document) -> None:
         self._source = document.source
         self._actions = document.actions
-        self._kinds = dict.fromkeys((*KINDS, *document.actions))
+        self._own = {
+            name: own_kind(name, text_of(each.values, "children") or "none")
+            for name, each in document.kinds.items()
+        }
+        self._kinds = dict.fromkeys((*KINDS, *document.actions, *self._own))
         self._doubts = Doubts(document)
         actions = document.node.get("actions")
         own = actions.pairs if isinstance(actions, Mapping) else []
@@ -100,7 +104,7 @@ class _Reader:
             self._only_children(written)
             source.unread.nodes.append(written)
             return None
-        kind = KINDS.get(key.text)
+        kind = KINDS.get(key.text) or self._own.get(key.text)
         if kind is not None:
             node = TreeNode(kind, key, written, source)
             self._fill(node, kind.keys)
@@ -194,7 +198,7 @@ class _Reader:
         self._source.unread.actions = True
         if any(self._doubts.declares(word.text) for word in words):
             return
-        known = [*KINDS, *self._actions]
+        known = [*self._kinds]
         meant = (word for word in words if kind_here(word.text) or closest(word.text, known))
         key = next(meant, words[0])
         same = folded(key.text) in map(folded, known)

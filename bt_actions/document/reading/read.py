@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping as MappingType
 
-from bt_actions.document.findings import Span
+from bt_actions.document.findings import Related, Span
 from bt_actions.document.findings.elsewhere import key_here
 from bt_actions.document.language.keys import DEFAULTS, LIBRARY_KEYS, TOP_KEYS
 from bt_actions.document.language.kinds import KINDS, NODE_KEYS, SINCE
@@ -41,7 +41,9 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
     document = Document(source, node)
     has_root = node.get("root") is not None
     if not library and not has_root and node.get("tree") is None:
-        library = any(node.get(name) is not None for name in ("actions", "topics", "defaults"))
+        library = any(
+            node.get(name) is not None for name in ("actions", "topics", "kinds", "defaults")
+        )
         if not library:
             message = "this is not a tree: the keys 'tree' and 'root' are missing"
             source.report("BT106", start_of(node), message)
@@ -59,7 +61,7 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
     document.values = values
     name = values.get("tree")
     document.name = name if isinstance(name, str) else ""
-    for table in ("inputs", "outputs", "actions", "topics"):
+    for table in ("inputs", "outputs", "actions", "topics", "kinds"):
         _declare(document, table, getattr(document, table))
     defaults = values.get("defaults")
     document.defaults = dict(defaults) if isinstance(defaults, dict) else {}
@@ -98,12 +100,20 @@ def _declare(document: Document, table: str, into: dict[str, Declared]) -> None:
         if read is BAD:
             own = {"type": BAD}
         into[key.text] = Declared(key.text, own, key, node, document.source)
-        if table == "actions" and _of_node(key.text):
+        if table == "kinds" and key.text in document.actions:
+            first = document.actions[key.text]
+            document.source.report(
+                "BT216", span_of(key), f"{key.text!r} is declared twice",
+                related=Related(first.place, "an action is called so here"),
+            )  # fmt: skip
+            del into[key.text]
+        elif table in ("actions", "kinds") and _of_node(key.text):
             what = "a kind of node" if key.text in KINDS else "a key of nodes"
             hint = None
             if since := SINCE.get(key.text):
                 what = f"{what} since bt_actions {since}"
                 hint = f"rename it here and where it is used, such as '{key.text}_action'"
-            text = f"{key.text!r} is {what} and cannot name an action"
+            named = "an action" if table == "actions" else "a kind of one's own"
+            text = f"{key.text!r} is {what} and cannot name {named}"
             document.source.report("BT208", span_of(key), text, hint=hint)
             del into[key.text]

@@ -104,6 +104,8 @@ class Document:
     outputs: dict[str, Declared] = field(default_factory=dict)
     actions: dict[str, Declared] = field(default_factory=dict)
     topics: dict[str, Declared] = field(default_factory=dict)
+    kinds: dict[str, Declared] = field(default_factory=dict)
+    """The kinds of its own."""
     defaults: dict[str, object] = field(default_factory=dict)
     settings: dict[str | None, dict[str, object]] = field(default_factory=dict)
     """What each alias (None: no alias) has where a node says nothing; made when first asked for."""

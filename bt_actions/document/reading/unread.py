@@ -18,7 +18,7 @@ from bt_actions.document.yaml.written import scalars_of
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _NAME = re.compile(r"[A-Za-z0-9_ -]+")
 """What somebody may have written as a name, and no expression."""
-_KNOWN = ("root", "inputs", "outputs", "actions", "topics")
+_KNOWN = ("root", "inputs", "outputs", "actions", "topics", "kinds")
 """Keys at the top of a tree whose values say nothing about the settings of all actions."""
 
 

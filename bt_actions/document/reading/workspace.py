@@ -234,6 +234,7 @@ class Workspace:
             for theirs, ours in (
                 (library.actions, document.actions),
                 (library.topics, document.topics),
+                (library.kinds, document.kinds),
             ):
                 for declared in theirs.values():
                     self._take_over(declared, ours, node, document)
