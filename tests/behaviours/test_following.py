@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 from py_trees.common import Status
+from py_trees.composites import Selector, Sequence
 
 from bt_actions import ActionBehaviour, Outcome, Timeouts
 from bt_actions.events import GoalChanged
+from tests.support.trees import Gate, Guard
 from tests.support.virtual import Runner
 
 if TYPE_CHECKING:
@@ -181,3 +183,54 @@ def test_a_stamp_of_now_is_no_difference(world: World) -> None:
 def test_a_word_that_is_none_is_refused() -> None:
     with pytest.raises(ValueError, match="on_change is one of ignore, replace, cancel, not 'now'"):
         ActionBehaviour("a", "a/action/B", "b", {}, on_change="now")
+
+
+@FOLLOWS
+def test_a_change_is_seen_though_nothing_wakes_the_tree(world: World, on_change: str) -> None:
+    it = Follower(world, on_change)
+    it.want(2.0, after=0.5)
+    it.runner.advance(0.5)
+    assert it.sent == [5.0, 2.0]
+
+
+def in_a_tree(world: World, *faults: str) -> tuple[Selector, Guard, list[float], Journal]:
+    """A leaf that replaces, below a guard, in a tree that goes on without it."""
+    journal = world.serve(*faults, preempts=False)
+    wanted, guard = [5.0], Guard()
+    guard.holds = True
+    leaf = ActionBehaviour(
+        "follow", world.servers["/move_robot"].action_type, "move_robot",
+        lambda: {"distance": wanted[0]}, on_change="replace",
+    )  # fmt: skip
+    guarded = Sequence("g", memory=False, children=[guard, leaf])
+    return Selector("s", True, children=[guarded, Gate()]), guard, wanted, journal
+
+
+def test_what_a_refused_goal_was_to_replace_is_canceled_while_the_tree_goes_on(
+    world: World,
+) -> None:
+    root, _, wanted, journal = in_a_tree(world, "2:reject")
+    with world.runner(root) as runner:
+        runner.start()
+        runner.advance(1.0)
+        wanted[0] = 2.0
+        runner.advance(1.0)
+        assert root.status is Status.RUNNING
+        assert journal.ends() == ["canceled", "rejected"]
+
+
+def test_what_is_stopped_while_it_replaces_leaves_neither_goal_while_the_tree_goes_on(
+    world: World,
+) -> None:
+    root, guard, wanted, journal = in_a_tree(world, "2:delay_accept=3")
+    with world.runner(root) as runner:
+        runner.start()
+        runner.advance(1.0)
+        wanted[0] = 2.0
+        runner.advance(0.5)
+        guard.holds = False
+        runner.advance(1.0)
+        assert root.status is Status.RUNNING
+        assert journal.ends()[0] == "canceled", "though the newer one is not accepted yet"
+        runner.advance(5.0)
+        assert journal.ends() == ["canceled", "canceled"]

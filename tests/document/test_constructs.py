@@ -387,3 +387,27 @@ def test_what_a_subtree_needs_before_it_runs_is_no_variable(load: Load) -> None:
     text = OUTER.format(who="$said").replace("children:", "children:\n    - set: {said: r1}")
     with pytest.raises(DocumentError, match=r"\$said is no input"):
         load(text, inner=INNER)
+
+
+def test_a_node_waits_for_no_first_message_where_there_is_a_default(
+    load: Load, network: VirtualNetwork
+) -> None:
+    network.publisher(Bool, "near", latched=True)
+    head = HEAD.replace("qos: latched}", "qos: latched, default: {data: true}}")
+    runner = VirtualRunner(load(f"{head}  check: $near.data\n"), network)
+    assert runner.run() is Status.SUCCESS
+    assert runner.now < 0.1
+
+
+def test_what_waits_anyway_waits_for_a_first_message_only_for_its_gate(
+    load: Load, network: VirtualNetwork
+) -> None:
+    network.publisher(Bool, "near", latched=True)
+    text = f"{HEAD}  wait_until: $near.data\n  timeout: 500 ms\n"
+    runner = VirtualRunner(load(text), network)
+    assert runner.run() is Status.FAILURE
+    assert runner.now < 0.8
+    began = runner.now
+    runner = VirtualRunner(load(f"{text}  only_if: $near.data\n"), network)
+    assert runner.run() is Status.FAILURE
+    assert runner.now - began > 0.8
