@@ -8,6 +8,7 @@ import pytest
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from bt_actions.behaviours.own import Outputs, equip
 from bt_actions.document import DocumentError, Source, check_source, load_tree, tree_outputs
 from bt_actions.document.formatting.format import format_source
 from tests.document.conftest import tick
@@ -136,3 +137,20 @@ def test_a_kind_and_its_use_are_checked(written: str, instead: str, code: str, t
     assert written in text
     found = check_source(Source("t.yaml", text.replace(written, instead, 1)))
     assert [one for one in found if one.code == code and told in one.message], found
+
+
+def test_what_was_set_in_an_earlier_visit_is_not_written_again() -> None:
+    class Once(Behaviour):
+        outputs: Outputs
+
+        def update(self) -> Status:
+            if not written:
+                self.outputs.x = 1
+            return Status.SUCCESS
+
+    written: list[dict[str, object]] = []
+    node = Once("once")
+    equip(node, {}, ["x"], lambda given: written.append(dict(given)))
+    node.tick_once()
+    node.tick_once()
+    assert written == [{"x": 1}, {}]
