@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 COLCON := .colcon
 
 INTERFACES := $(shell find interfaces bt_actions/packages -type f -not -name '*.pyc')
-JAVASCRIPT := $(filter-out %/main.js %/other.js,$(wildcard bt_actions/*/*.js bt_actions/*/static/*.js))
+JAVASCRIPT := $(wildcard bt_actions/*/*.js bt_actions/*/static/*.js)
 PROJECT := setup.py setup.cfg pyproject.toml package.xml $(shell find trees launch -name '*.y*ml' -o -name '*.launch.py' 2>/dev/null)
 
 # A ROS installation or another environment in the caller's shell must not leak into these.
