@@ -14,28 +14,9 @@ from bt_actions.importing.names import identifier
 from bt_actions.importing.project import SUBTREES, Definition, Project, kind_of
 from bt_actions.importing.reading import XmlError
 from bt_actions.importing.report import Report, Verdict
+from bt_actions.importing.stubs import MODULE, module
 from bt_actions.importing.text import document
-from bt_actions.importing.writer import STUBS, Writer
-
-_CLASS = """
-
-class {name}(Leaf):
-    def __init__(self, name: str{arguments}) -> None:
-        super().__init__(name)
-"""
-_STUBS = '''"""Leaves of the imported trees that are to be written: nothing was known of them."""
-
-from __future__ import annotations
-
-from py_trees.behaviour import Behaviour
-from py_trees.common import Status
-
-
-class Leaf(Behaviour):
-    def update(self) -> Status:
-        self.feedback_message = f"{type(self).__name__} is to be written"
-        return Status.FAILURE
-'''
+from bt_actions.importing.writer import Writer
 
 
 @dataclass
@@ -66,7 +47,6 @@ def convert(paths: list[Path], mapping: Map | None = None) -> Imported:
     waiting = [each for each in project.trees.values() if each.name not in called]
     waiting = waiting or list(project.trees.values())  # they hold each other
     begun: list[Definition] = []
-    stubs: dict[str, set[str]] = {}
 
     def call(definition: Definition) -> str:
         waiting.append(definition)
@@ -82,23 +62,15 @@ def convert(paths: list[Path], mapping: Map | None = None) -> Imported:
         text = document(tree, tree.comments)
         name = f"{names[definition.name]}.yaml"
         imported.files[name] = format_source(Source(name, text))
-        for stub, arguments in writer.stubs.items():
-            stubs.setdefault(stub, set()).update(arguments)
     for definition in project.trees.values():
         for element in definition.element.children:
             for inner in element.walk():
                 if not imported.report.knows(inner):
                     why = "its tree is not used by any that was written"
                     imported.report.node(inner, Verdict.DROPPED, why)
-    if stubs:
-        imported.files[f"{STUBS}.py"] = _STUBS + "".join(map(_class, sorted(stubs.items())))
+    if project.stubs:
+        imported.files[f"{MODULE}.py"] = module(project.stubs.values())
     return imported
-
-
-def _class(stub: tuple[str, set[str]]) -> str:
-    name, arguments = stub
-    keys = "".join(f", {each}: object = None" for each in sorted(arguments))
-    return _CLASS.format(name=name, arguments=f", *{keys}" if keys else "")
 
 
 def _unique(word: str, taken: Collection[str]) -> str:

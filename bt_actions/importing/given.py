@@ -26,9 +26,6 @@ class Writing(Protocol):
     def node(self, element: Element, scope: Scope) -> Node:
         """Write a node."""
 
-    def stub(self, given: Given, arguments: dict[str, object], why: str) -> Node:
-        """Return a class that is to be written."""
-
 
 class Given:
     """The attributes of a node: those that were taken are accounted for."""

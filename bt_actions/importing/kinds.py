@@ -138,7 +138,8 @@ def _if(**more: object) -> Handler:
         children = given.children()
         if not 2 <= len(children) <= 3:
             raise Refused("children")
-        stub = "python" in children[0] and given.element.children[0].tag != "Action"
+        stub = next(iter(children[0])) in given.writer.words["kinds"]
+        stub = stub and given.element.children[0].tag != "Action"
         if more and takes_time(children[0]) and not stub:  # a stub may be a condition
             raise Refused("condition")
         node = Node({"if": _asked_by(children[0]), **more, "then": children[1]})

@@ -11,6 +11,7 @@ from bt_actions.importing.mapping import SAVES, Leaf
 from bt_actions.importing.names import ros_name, value_of
 from bt_actions.importing.project import ports_of, variable_in
 from bt_actions.importing.scripts import Refused
+from bt_actions.importing.stubs import stub_node
 from bt_actions.importing.text import Node
 
 _MISSING = object()
@@ -22,16 +23,7 @@ def leaf(given: Given) -> Node:
     known = writer.project.mapping.leaves.get(given.kind)
     if known is not None:
         return _Filled(given, known).node()
-    if given.element.children:
-        raise Refused("decorator")
-    arguments = {}
-    for port, text in ports_of(given.element):
-        if variable_in(text, port) is not None:
-            given.dropped(port, "a python node takes no variable: write a kind of your own")
-        elif re.fullmatch(r"[A-Za-z]\w*", port) and port != "name":
-            arguments[port] = value_of(text, "")
-            given.converted(port)
-    return writer.stub(given, arguments, "nothing is known of it, and --map has no row")
+    return stub_node(given, "nothing is known of it, and --map has no row")
 
 
 class _Filled:

@@ -14,6 +14,16 @@ _LONGEST_NAME = 120
 _ROS_NAME = r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*"
 
 
+NOTHING = {
+    "string": "",
+    "bool": False,
+    "float64": 0.0,
+    "float32": 0.0,
+    **dict.fromkeys(("int64", "int32", "uint16", "uint8"), 0),
+}
+"""By type: what a variable holds that nothing wrote; a message its defaults."""
+
+
 def identifier(text: str) -> str:
     """Return a name of ours that is as near to a text as can be."""
     word = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")

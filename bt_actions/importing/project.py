@@ -11,9 +11,11 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from bt_actions.importing.mapping import Leaf, Map, texts_in
 from bt_actions.importing.reading import Element, XmlError, read_file
+from bt_actions.importing.refused import rows
 from bt_actions.importing.report import Report, Verdict
 from bt_actions.importing.scripts import (
     Part,
@@ -100,6 +102,10 @@ class Project:
         self.trees: dict[str, Definition] = {}
         self.models: dict[str, dict[str, str]] = {}
         """By ID: the directions of the ports."""
+        self.model_types: dict[str, dict[str, str]] = {}
+        """By ID: the types of the ports, as far as they are known here."""
+        self.stubs: dict[str, Any] = {}
+        """By ID: the kinds that are to be written; `stubs.py` fills it."""
         self.failed: list[XmlError] = []
         self.sorts = Sorts()
         self.types: dict[str, str] = {}
@@ -175,9 +181,14 @@ class Project:
 
     def _models(self, element: Element) -> None:
         for model in element.children:
-            ports = self.models.setdefault(model.attributes.get("ID", model.tag), {})
+            kind = model.attributes.get("ID", model.tag)
+            ports = self.models.setdefault(kind, {})
+            types = self.model_types.setdefault(kind, {})
             for port in model.children:
-                ports[port.attributes.get("name", "")] = port.tag.removesuffix("_port")
+                name = port.attributes.get("name", "")
+                ports[name] = port.tag.removesuffix("_port")
+                if known := _of_cpp(port.attributes.get("type", "")):
+                    types[name] = known
 
     # What variables are
 
@@ -208,7 +219,8 @@ class Project:
             name = variable_in(text, port)
             if name is not None and len(cases) == 1 and port == "variable":
                 self.sorts.use(name, *cases)
-            kind_of_port = leaf.type_of(port) if leaf is not None else ""
+            model = self.model_types.get(kind, {}).get(port, "")
+            kind_of_port = leaf.type_of(port) if leaf is not None else model
             if port in ("value_A", "value_B"):
                 kind_of_port = COMPARED.get(kind, "")
             if kind == "GoalUpdater":
@@ -317,7 +329,7 @@ class Project:
             yield from self._asked(attributes.get(name, ""))
         if kind in SUBTREES:
             yield from self._of_subtree(element)
-        elif kind == "Script" or kind == "ScriptCondition":
+        elif kind in ("Script", "ScriptCondition"):
             yield from self._run(attributes.get("code", ""))
         elif kind == "Precondition":
             yield from self._asked(attributes.get("if", ""))
@@ -334,14 +346,14 @@ class Project:
 
     def _of_ports(self, element: Element, kind: str) -> Iterator[tuple[str, str]]:
         leaf, directions = self.mapping.leaves.get(kind), self.directions(kind)
+        if leaf is None and (kind in _WITHOUT_PORTS or kind in rows()):
+            return
         found = []
         used = _ports_used(leaf) if leaf is not None else None
         for port, text in ports_of(element):
             name = variable_in(text, port)
             if name is None or (used is not None and port not in used):
                 continue
-            if leaf is None and kind not in READ_BY_KIND:
-                continue  # a stub reads and writes nothing
             found.append((name, directions.get(port, "input")))
         yield from ((name, "r") for name, direction in found if direction != "output")
         yield from ((name, "w") for name, direction in found if direction != "input")
@@ -403,11 +415,8 @@ COMPARED = {
     "BlackboardCheckBool": "bool",
 }
 """Decorators of BehaviorTree.CPP 3 that compare two values, and the type of these."""
-READ_BY_KIND = frozenset(
-    {"Repeat", "RetryUntilSuccessful", "RetryUntilSuccesful", "Timeout", "Delay", "Sleep",
-     *(f"Switch{cases}" for cases in range(2, 7)), "GoalUpdater", *SELECTORS, *LOOPS, *COMPARED}
-)  # fmt: skip
-"""Kinds with ports that are not in a map."""
+_WITHOUT_PORTS = ("GoalUpdated", "GlobalUpdatedGoal", "GoalUpdatedController")
+"""Kinds whose ports have no meaning here."""
 WRITTEN_BY_KIND = {"GoalUpdater": "output_goal", **SELECTORS}
 """Kinds that are not in a map, and the port that they write."""
 
@@ -424,6 +433,25 @@ def outer_name(element: Element, inner: Definition, name: str) -> str | None:
         return variable_in(text, name)
     private = name.startswith("_") and inner.version == 4
     return name if is_shared(element) and not private else None
+
+
+def _of_cpp(text: str) -> str:
+    """Return a type of C++ as one of ours, or ""."""
+    if found := re.fullmatch(r"(?:::)?(\w+)::msg::(\w+)", text):
+        return f"{found[1]}/msg/{found[2]}"
+    for ours, theirs in _CPP.items():
+        if text in theirs:
+            return ours
+    return ""
+
+
+_CPP = {
+    "string": ("std::string", "string", "std::string_view"),
+    "float64": ("double", "float"),
+    "bool": ("bool",),
+    "int64": ("int", "unsigned", "unsigned int", "unsigned char", "long", "size_t", "uint8_t",
+              "int32_t", "uint32_t", "int64_t", "uint64_t", "uint16_t", "int16_t"),
+}  # fmt: skip
 
 
 def _carried(value: Part) -> Iterator[str]:

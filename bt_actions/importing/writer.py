@@ -13,6 +13,7 @@ from typing import Any
 from bt_actions.importing.given import Given, Handler
 from bt_actions.importing.mapping import SAVES, texts_in
 from bt_actions.importing.names import (
+    NOTHING,
     Scope,
     identifier,
     in_sequence,
@@ -37,15 +38,12 @@ from bt_actions.importing.refused import rows
 from bt_actions.importing.report import Verdict
 from bt_actions.importing.saying import asked, assignments
 from bt_actions.importing.scripts import Refused, ScriptError
+from bt_actions.importing.stubs import stub_node
 from bt_actions.importing.text import Node
 
-_NOTHING = {"string": "", "bool": False, "float64": 0.0, "int64": 0, "uint16": 0}
-"""By type: what a variable holds that nothing wrote; a message its defaults."""
 _PACING = ("RateController", "GoalUpdatedController")
 """What means something to the pipeline around it alone."""
 _CONCURRENT = re.compile(r"Parallel|Reactive|Pipeline|WhileDoElse|Switch|Timeout|NonblockingSeq")
-STUBS = "leaves_to_write"
-"""The module of the classes that stand for what nothing is known of."""
 
 
 class Writer:
@@ -60,10 +58,8 @@ class Writer:
         self.definition = definition
         self.above: list[str] = []
         """The kinds of the nodes around the one that is written."""
-        self.words: dict[str, dict[str, Any]] = {"actions": {}, "topics": {}}
+        self.words: dict[str, dict[str, Any]] = {"actions": {}, "topics": {}, "kinds": {}}
         self.imports: set[str] = set()
-        self.stubs: dict[str, set[str]] = {}
-        """The classes that are to be written, with their arguments."""
         self._inside: list[Definition] = [definition]
 
     # The tree
@@ -105,7 +101,7 @@ class Writer:
         types = {scope[each]: self.project.type_of(each) for each in self.definition.accesses}
         for name in sorted(_read_only(root) - {*inputs, *both, *self.words["topics"]}):
             kind = types.get(name, "string")  # what would have written it was not imported
-            nothing = _NOTHING.get(kind, {})
+            nothing = NOTHING.get(kind, {})
             if name in outputs:
                 both[name] = nothing
             else:
@@ -216,16 +212,6 @@ class Writer:
             node = Node(sequence=f"If {given.name()} may be", children=[check, node])
         return node
 
-    def stub(self, given: Given, arguments: dict[str, object], why: str) -> Node:
-        """Return a class that is to be written, which stands for what nothing is known of."""
-        name = identifier(given.element.attributes.get("ID", given.kind))
-        self.stubs.setdefault(name, set()).update(arguments)
-        given.differs(f"{why}: write {STUBS}.{name}")
-        node = Node(python=f"{STUBS}.{name}", name=given.name(name))
-        if arguments:
-            node["arguments"] = arguments
-        return node
-
     # Subtrees
 
     def _subtree(self, given: Given) -> Node:
@@ -235,9 +221,7 @@ class Writer:
             if name in element.attributes:
                 given.converted(name)
         if inner is None or inner.root is None:
-            for port, _ in ports_of(element):
-                given.dropped(port, "the tree is not in the files that were given")
-            return self.stub(given, {}, "it is not in the files that were given")
+            return stub_node(given, "it is not in the files that were given")
         if any(self.project.reaches(inner, around) for around in self._inside):
             raise Refused("recursion")
         shares = kind_of(inner.root) in _PACING or any(
