@@ -6,6 +6,7 @@ of the model, of a variable that is given to it, or of a value.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -101,15 +102,34 @@ def _tree_of(element: Element) -> str:
 
 
 def _type(project: Project, kind: str, port: str, texts: Iterable[str]) -> str:
-    if known := project.model_types.get(kind, {}).get(port):
+    """Return the type that all that is given to a port has; that of texts where there are two."""
+    variables = {text: variable_in(text, port) for text in texts}
+    found = {
+        _of_literal(text) if name is None else project.type_of(name)
+        for text, name in variables.items()
+    }
+    known = project.model_types.get(kind, {}).get(port)
+    if known and found <= {known, "int64"}:
         return known
-    names = [name for text in texts if (name := variable_in(text, port)) is not None]
-    if names:
-        return project.type_of(names[0])
-    found = {type(value_of(text, "")).__name__ for text in texts}
-    if found <= {"int", "float"}:
-        return "float64" if "float" in found else "int64"
-    return "bool" if found == {"bool"} else "string"
+    if len(found) == 1:
+        return found.pop()
+    return "float64" if found == {"float64", "int64"} else "string"
+
+
+def _of_literal(text: str) -> str:
+    value = value_of(text, "")
+    if isinstance(value, float) and not math.isfinite(value):
+        return "string"
+    return {bool: "bool", int: "int64", float: "float64"}.get(type(value), "string")
+
+
+def _as(kind: str, reference: str | None, given: str) -> str | None:
+    """Return a variable of another type as a text, or a text as the number that it holds."""
+    function = {"string": "str", "float64": "float", "int64": "int"}.get(kind)
+    is_text = "string" in (kind, given)
+    if reference is None or function is None or kind == given or not is_text or "/" in given:
+        return reference
+    return f"= {function}({reference})"
 
 
 def stub_node(given: Given, why: str) -> Node:
@@ -130,7 +150,11 @@ def stub_node(given: Given, why: str) -> Node:
         if word in stub.inputs:
             form = stub.inputs[word]
             known = str(form["type"] if isinstance(form, dict) else form)
-            values[word] = given.reference(port) if name is not None else value_of(text, known)
+            values[word] = (
+                value_of(text, known)
+                if name is None
+                else _as(known, given.reference(port), project.type_of(name))
+            )
         if word in stub.outputs and name is not None:
             saved[scope[name]] = word
     if values:
