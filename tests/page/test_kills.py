@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 
 from bt_actions.events import AttemptEnded, FeedbackCame, GoalChanged, RoundBegan
+from bt_actions.page import feed
 from bt_actions.page.standing import token
 from bt_actions.recording.folders import home, read_summary, recorded
 from bt_actions.recording.reading import Recording
@@ -58,6 +59,7 @@ class Killed:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(400)  # fifty kills
 def test_a_view_that_is_killed_at_any_moment_leaves_no_gap(begin: Begin) -> None:
     dice, events = random.Random(7), told_of(rounds=150)
     run, view, cookie = begin(events), Killed(), token()
@@ -100,8 +102,12 @@ def test_a_view_that_is_killed_at_any_moment_leaves_no_gap(begin: Begin) -> None
 
 
 @pytest.mark.slow
-def test_a_run_that_is_killed_at_any_moment_is_told_whole_and_as_lost(served: Served) -> None:
+@pytest.mark.timeout(400)  # fifty kills
+def test_a_run_that_is_killed_at_any_moment_is_told_whole_and_as_lost(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
     dice = random.Random(3)
+    monkeypatch.setattr(feed, "BEAT", 0.1)  # so that the end is seen soon
     for _ in range(KILLS):
         process = subprocess.Popen(
             [sys.executable, "-m", "tests.support.recorded_process", str(home()), "200"],
