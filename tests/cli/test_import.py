@@ -43,6 +43,19 @@ def test_the_report_tells_of_all(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "main.xml:2:1: node AlwaysSuccess: converted\n" in out
 
 
+def test_classes_that_were_written_meanwhile_stay(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(tmp_path, "<OpenDoor/>") == 0
+    classes = tmp_path / "trees" / "leaves_to_write.py"
+    classes.write_text("# written\n", encoding="utf-8")
+    capsys.readouterr()
+    assert run(tmp_path, "<OpenDoor/><CloseDoor/>") == 0
+    assert classes.read_text(encoding="utf-8") == "# written\n"
+    assert "leaves_to_write.py is there, and stays" in capsys.readouterr().err
+    assert "CloseDoor" in (tmp_path / "trees" / "Main.yaml").read_text(encoding="utf-8")
+
+
 def test_where_a_file_cannot_be_read_nothing_is_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -77,6 +77,9 @@ def _write(imported: Imported, folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in imported.files.items():
+            if name.endswith(".py") and (folder / name).exists():
+                note(f"{folder / name} is there, and stays: somebody may have written in it")
+                continue
             replace_file(folder / name, text.encode())
     except OSError as error:
         raise BadInput(f"{folder}: cannot be written: {error.strerror or error}") from None
