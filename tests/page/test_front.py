@@ -13,6 +13,7 @@ from bt_actions.recording import watching
 from bt_actions.recording.folders import Summary
 from bt_actions.recording.unrecorded import told
 from tests.page.conftest import Begin, Served
+from tests.page.test_access import barriers
 from tests.page.test_feed import told_of
 from tests.recording.test_watching import RUNS, fails
 from tests.support import browser as chromium
@@ -183,3 +184,15 @@ def test_the_front_is_not_wider_than_the_window(
     assert opened.run("return document.documentElement.scrollWidth") <= width
     other = "document.getElementById('other')"
     assert opened.run(f"return {other}.scrollWidth - {other}.clientWidth") <= 0
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_there_are_no_barriers_on_the_front(
+    opened: chromium.Browser, served: Served, begin: Begin, scheme: str
+) -> None:
+    record(told_of())
+    begin(named(RUNS, 1, "patrol")).write(named(RUNS, 1, "patrol"))
+    opened.scheme(scheme)
+    opened.open(f"{served.address}&runs", width=1440, height=900)
+    assert opened.wait_for(f"{ROWS}.length === 2 && {CARDS}.some((one) => one.includes('patrol'))")
+    assert barriers(opened) == "[]"
