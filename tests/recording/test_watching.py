@@ -113,7 +113,9 @@ def test_the_clock_goes_on_for_a_second_behind_a_sign_of_life_and_no_further(
     run.beat(5.0)
     began = RUNS[-1].at.steady - RUNS[1].at.steady + 5.0
     assert began <= the_one(watch).seconds <= began + watching.AHEAD
-    os.utime(run.first, (0, time.time() - 9.5))  # nothing was written since
+    os.utime(run.first, (0, time.time() - 2.0))  # nothing was written since
+    assert the_one(watch).seconds == pytest.approx(began + watching.AHEAD)
+    os.utime(run.first, (0, time.time() - 9.5))
     seen = the_one(watch)
     assert seen.seconds == pytest.approx(began)
     assert (seen.word, seen.look) == ("Stale for 9 s", "waiting")
