@@ -85,7 +85,7 @@ def test_the_demo_ends_with_the_command_that_shows_its_run(
     record(events)
     path = Path(sys.executable).parent
     shown = subprocess.run(
-        ["make", "--dry-run", "--old-file=setup", "demo", f"BIN={path}"],
+        ["make", "--no-print-directory", "--dry-run", "--old-file=setup", "demo", f"BIN={path}"],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -74,6 +74,7 @@ def test_there_are_no_barriers_in_a_tree_that_is_drawn(
 
 def test_the_tree_is_walked_folded_and_searched_by_keys_alone(over: Page) -> None:
     window = over.open()
+    assert window.wait_for("document.querySelector('.row[aria-selected=true]') !== null")
     window.run("document.querySelector('.row[aria-selected=true]').focus()")
     assert window.run(FOCUS).startswith("Home, MoveRobot, ABORTED")
     window.keys("Left")  # to the parent
