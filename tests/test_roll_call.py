@@ -32,7 +32,7 @@ class Roll(RollCall):
         number = next(self._numbers)
         self.asked(number, self.now)
         for _ in range(answers):
-            self.answered(number, self.now + after)
+            self.answer_came(number, self.now + after)
         self.now += max(after, ASK_AGAIN)
 
     def settle(self, answers: int = 1) -> None:
@@ -134,7 +134,7 @@ class Denied(Answers):
         for _ in range(times):
             number = self.question(*of)
             for _ in range(denials):
-                self.answered(number)
+                self.answer_came(number)
 
 
 LONG = 30

@@ -54,7 +54,7 @@ class Answers:
         """Take note that the question of this number was asked, `of` these servers."""
         self._asked[number] = now, of
 
-    def answered(self, number: int) -> bool:
+    def answer_came(self, number: int) -> bool:
         """Take the answer of one server to this question; return whether it was the last."""
         if number not in self._asked:
             return False
@@ -136,11 +136,11 @@ class RollCall:
         self._answers.asked(number, self._shown, now)
         self._asked_at = now
 
-    def answered(self, number: int, now: float) -> None:
+    def answer_came(self, number: int, now: float) -> None:
         """Take an answer to the question of this number, or to one about a goal."""
         self._heard_at = now
         # Of one that has gone untold nobody can say that it has answered
-        if now - self._asked_at <= LATE and self._answers.answered(number) and not self._gone:
+        if now - self._asked_at <= LATE and self._answers.answer_came(number) and not self._gone:
             self._complete_at = now
             if self._answers.lasted >= self._settle:
                 self._settled |= self._shown

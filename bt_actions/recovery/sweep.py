@@ -249,12 +249,12 @@ class Cleanup:
 
     def _hear(self, call: RollCall, view: ActionView) -> None:
         for number, code in view.answers():
-            call.answered(number, time.monotonic())
+            call.answer_came(number, time.monotonic())
             left = self._questions.get((call, number))
             if left is None:
                 continue
             if code in (CANCEL_UNKNOWN_GOAL, CANCEL_TERMINATED):
-                left.denials.answered(number)
+                left.denials.answer_came(number)
             else:
                 self._turns_up(left)
 

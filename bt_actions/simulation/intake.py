@@ -79,8 +79,8 @@ class Intake:
         self._accepted[request.goal_id] = request
         return True
 
-    def answered(self, goal: object, goal_id: str) -> bool:
-        """Clean up after a request; return whether its goal was accepted and not started."""
+    def close_request(self, goal: object, goal_id: str) -> bool:
+        """Close an answered request; return whether its goal was accepted, and not started."""
         request = self._undecided.pop(id(goal), None)
         if request is not None:
             self._reject(request, "its id is already in use")

@@ -192,7 +192,7 @@ class SimulatedServer(Owner):
     def on_answered(self, request: Request) -> None:
         with self.stepper.lock:
             if request.kind == "goal":
-                not_started = self._intake.answered(request.goal, request.goal_id)
+                not_started = self._intake.close_request(request.goal, request.goal_id)
                 if not_started and self._wire and self._wire.knows(request.goal_id):
                     # The client went away before its answer; rclpy then starts nothing.
                     self.start(request.goal_id, request.goal)
