@@ -46,7 +46,7 @@ class Watcher:
             self._numbers[run] = message.number
             state = self.runs.setdefault(run, State())
             if message.data:  # else its values are for nobody
-                state.observe(from_line(message.data))
+                state.fold(from_line(message.data))
             self.follows(run, message)
 
     def states(self, message: RunStates) -> None:

@@ -82,7 +82,7 @@ class Soak:
         self._said = said.open("w", encoding="utf-8")
         self._visits = 0
 
-    def observe(self, event: Event) -> None:
+    def note_goal(self, event: Event) -> None:
         """Take note of a goal; in a file, so that the notes are no growth."""
         if isinstance(event, GoalChanged) and event.outcome is not None:
             self._said.write(f"{event.goal_id} {event.end} {event.outcome}\n")
@@ -176,7 +176,7 @@ def run(goals: int, directory: Path) -> list[str]:
     began = time.monotonic()
     try:
         with TreeRunner(root) as runner:
-            runner.observe(soak.observe)
+            runner.observe_events(soak.note_goal)
             if runner.run() is not Status.SUCCESS:
                 wrong.append("the tree did not succeed")
             wrong += [f"{report} is unaccounted for" for report in runner.unaccounted]

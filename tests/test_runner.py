@@ -83,7 +83,7 @@ class TestRun:
     def test_in_a_place_that_is_told(self, node: Any) -> None:
         with TreeRunner(py_trees.behaviours.Success("s"), node=node) as runner:
             begun: list[Event] = []
-            runner.observe(begun.append)
+            runner.observe_events(begun.append)
             runner.run(timeout=9.0)
         assert isinstance(begun[0], RunBegan)
         assert begun[0].where == {
@@ -390,7 +390,7 @@ class TestStuckInATick:
 
         def told() -> list[str]:
             for event in reader.take():
-                run.observe(event)
+                run.fold(event)
             return why(run, time.monotonic())
 
         with TreeRunner(in_sequence(stuck, name="Look"), node=node) as runner:
@@ -433,7 +433,7 @@ class TestInterrupt:
         leaf = MoveRobot("m", 9.0, action_name=name)
         with TreeRunner(leaf, node=node) as runner:
             before = signal.signal(signal.SIGUSR2, lambda *_: runner.interrupt())
-            runner.observe(
+            runner.observe_events(
                 lambda event: (
                     os.kill(os.getpid(), signal.SIGUSR2)
                     if isinstance(event, GoalChanged) and event.state == "EXECUTING"
@@ -536,7 +536,7 @@ class TestStart:
 
         told: list[str] = []
         with TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner:
-            runner.observe(observer)
+            runner.observe_events(observer)
             runner.start()
             assert runner.wait(5.0) is Status.SUCCESS
         assert "interrupt()" in told[0]
@@ -700,7 +700,7 @@ class TestEvents:
         events: list[Event] = []
         leaf = MoveRobot("m", 0.2, action_name=name)
         with TreeRunner(in_sequence(leaf, name="root"), node=node) as runner:
-            runner.observe(events.append)
+            runner.observe_events(events.append)
             runner.run(timeout=9.0)
         assert isinstance(events[0], RunBegan)
         assert isinstance(events[-1], TreeFinished)
@@ -735,7 +735,7 @@ class TestEvents:
         events: list[Event] = []
         leaf = MoveRobot("m", 0.2, action_name=name)
         with TreeRunner(together(leaf, Sleeps("sleeps")), node=node) as runner:
-            runner.observe(events.append)
+            runner.observe_events(events.append)
             assert runner.run(timeout=20.0) is Status.SUCCESS
         told = {e.state: e.at.steady for e in events if isinstance(e, GoalChanged)}
         at_server = {str(entry.event): entry.t for entry in journal.entries() if entry.goal}
@@ -747,7 +747,7 @@ class TestEvents:
     ) -> None:
         threads: set[int] = set()
         with TreeRunner(MoveRobot("m", 0.1, action_name=name), node=node) as runner:
-            runner.observe(lambda event: threads.add(threading.get_ident()))
+            runner.observe_events(lambda event: threads.add(threading.get_ident()))
             runner.run(timeout=9.0)
         assert threads == {threading.get_ident()}
 
@@ -760,7 +760,7 @@ class TestEvents:
         with spun(node), contextlib.ExitStack() as stack:
             runners = [stack.enter_context(TreeRunner(leaf, node=node)) for leaf in leaves]
             for runner, events in zip(runners, heard, strict=True):
-                runner.observe(events.append)
+                runner.observe_events(events.append)
                 runner.start()
             for runner in runners:
                 assert runner.wait(5.0) is Status.SUCCESS

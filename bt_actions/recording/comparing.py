@@ -106,7 +106,7 @@ class Walk:
             else:
                 node = getattr(item, "node", None)
                 before = self.state.status_of(node) if isinstance(node, int) else Status.INVALID
-                self.state.observe(item)
+                self.state.fold(item)
                 if node is None or node in self._place:
                     self._take(item, before)
             if isinstance(item, State | RunBegan | NodesAdded | NodesRemoved):

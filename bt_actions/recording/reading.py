@@ -109,7 +109,7 @@ class Recording:
             if isinstance(item, State):
                 state = item
             else:
-                state.observe(item)
+                state.fold(item)
         if state.began is None:
             raise RecordingError(f"{self.first} holds no run")
         return state

@@ -48,7 +48,7 @@ class Tape:
                 self.times.append(max(item.at.steady, self.times[-1] if self.times else 0.0))
                 if _fails(state, item):
                     self.failures.append(len(self.times))
-                state.observe(item)
+                state.fold(item)
                 progress(len(self.times))
             if item is state or (size >= least and state.began is not None):
                 self._blocks.append(_packed(lines))
@@ -79,7 +79,7 @@ class Tape:
             self._state = from_json(before.decode("ascii")) if before else State()
             self._position = start
         for line in self._lines[self._position - start : position - start]:
-            self._state.observe(from_line(line))
+            self._state.fold(from_line(line))
         self._position = position
         return self._state
 

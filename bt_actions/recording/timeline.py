@@ -92,7 +92,7 @@ class Timeline:
     def _told(self, event: Event) -> Iterator[Line]:
         state, node = self.state, getattr(event, "node", None)
         was = state.status_of(node) if isinstance(node, int) else Status.INVALID
-        state.observe(event)
+        state.fold(event)
         if isinstance(node, int) and node not in state.nodes:
             return
         if isinstance(event, RunBegan | NodesAdded | NodesRemoved):

@@ -122,7 +122,7 @@ class _Run:
                     if isinstance(item, State):
                         self._state = item
                     else:
-                        self._state.observe(item)
+                        self._state.fold(item)
                 self._last = self._told(self._follower, lost, goes_on=goes_on)
             except (OSError, ValueError) as error:
                 said = f"its recording cannot be read: {error}"

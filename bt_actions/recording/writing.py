@@ -113,7 +113,7 @@ class RunWriter:
             told = bare(told)
         if told is None:
             return
-        self.state.observe(told)
+        self.state.fold(told)
         if self.failed:
             return
         self._number = told.at.number

@@ -153,7 +153,7 @@ class _Run:
             told = bare(told)
         self._latest = event.at
         if told is not None:
-            self.state.observe(told)
+            self.state.fold(told)
         return told
 
     def message(self, event: Event, told: Event | None) -> RunEvent:

@@ -111,7 +111,7 @@ class TickLoop:
         """What is raised after the drain; also what an observer raised to end the program."""
         self._drain: Drain | None = None
 
-    def observe(self, callback: Observer) -> None:
+    def observe_events(self, callback: Observer) -> None:
         """Call `callback` with each event, in the step; one that raises is removed."""
         self._observers[self.teller.stream.reader(room=sys.maxsize)] = callback
 

@@ -160,14 +160,14 @@ class TreeRunner:
             raise RuntimeError("the tree has not been started, so there is nothing to wait for")
         return self._started.future
 
-    def observe(self, callback: Observer) -> None:
+    def observe_events(self, callback: Observer) -> None:
         """Call `callback` with each event of a run, on the ticking thread.
 
         What becomes known of its goals in `shutdown` is told there.
         One that raises is removed, and the run goes on; SystemExit and the like end it, and are
         raised again when its goals have been drained.
         """
-        self._loop.observe(callback)
+        self._loop.observe_events(callback)
 
     def on_close(self, callback: Callable[[], None]) -> None:
         """Call `callback` in `shutdown`, while nothing spins and the context still lives.

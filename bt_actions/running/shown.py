@@ -43,10 +43,10 @@ class ShownRun:
                     "name; its value is the tree's all the same"
                 )
         self._rosout = wiring.rosout(runner.node)
-        runner.observe(self._observe)
+        runner.observe_events(self._told)
 
-    def _observe(self, event: Event) -> None:
-        self._state.observe(event)
+    def _told(self, event: Event) -> None:
+        self._state.fold(event)
         if isinstance(event, RunBegan):
             file = event.nodes[0].place.rsplit(":", 2)[0]
             self._rosout.say("info", f"{event.tree} {begins_text(file, event.inputs)}")

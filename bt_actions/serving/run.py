@@ -99,7 +99,7 @@ class Run:
         """Give how it stands by now, also while a tick does not return; on any thread."""
         with self._lock:
             for event in self._events.take() if self._events is not None else ():
-                self._state.observe(event)
+                self._state.fold(event)
             yield self._state
 
     # On the run's thread

@@ -44,7 +44,7 @@ class GoalStory:
         """Whether it has not begun as far as its server knows, which may change."""
         return self.latest.end is End.NEVER_STARTED and self.latest.state != DONE
 
-    def observe(self, event: GoalChanged) -> None:
+    def goal_changed(self, event: GoalChanged) -> None:
         """Take in what has become of it."""
         if event.state != self.latest.state:
             self.since = event.at
@@ -145,13 +145,13 @@ class ActionStory:
         begun = self.begun
         return [goal for goal in self.goals.values() if goal.began.steady >= begun]
 
-    def observe(self, event: GoalChanged) -> None:
+    def goal_changed(self, event: GoalChanged) -> None:
         """Take in one event of a goal of this leaf."""
         goal = self.goals.get(event.goal_id)
         if goal is None:
             goal = self._begin(event)
         else:
-            goal.observe(event)
+            goal.goal_changed(event)
         if goal is not self.latest:
             return  # an older goal, on its way to its end
         if event.outcome is not None and self.outcome is None:

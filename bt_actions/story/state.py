@@ -88,7 +88,7 @@ class NodeStory:
 
 @dataclass(slots=True, eq=False)
 class State:
-    """A run as it stands after the events that it has observed."""
+    """A run as it stands after the events that were folded into it."""
 
     began: RunBegan | None = None
     nodes: dict[int, NodeStory] = field(default_factory=dict)
@@ -131,7 +131,7 @@ class State:
 
     # Taking in
 
-    def observe(self, event: Event) -> None:
+    def fold(self, event: Event) -> None:
         """Take in one event, in the order of their numbers."""
         self.now = event.at
         node = getattr(event, "node", None)
@@ -142,7 +142,7 @@ class State:
             case NodeChanged():
                 self._node_changed(event)
             case GoalChanged():
-                self.action(event.node).observe(event)
+                self.action(event.node).goal_changed(event)
             case FeedbackCame():
                 if (goal := self.action(event.node).goals.get(event.goal_id)) is not None:
                     goal.feedback = event

@@ -65,7 +65,7 @@ class VirtualRunner:
             heartbeat=heartbeat,
             wake=self._wake,
         )
-        self._loop.observe(self._note)
+        self._loop.observe_events(self._note)
 
     def __repr__(self) -> str:
         """Tell why the run failed, or waits: pytest prints it where an assertion fails."""
@@ -87,9 +87,9 @@ class VirtualRunner:
             raise RuntimeError("the run goes on: let it end first, with advance() or run()")
         return self._loop.goals.unaccounted
 
-    def observe(self, callback: Observer) -> None:
+    def observe_events(self, callback: Observer) -> None:
         """Call `callback` with each event from now on."""
-        self._loop.observe(callback)
+        self._loop.observe_events(callback)
 
     def run(self, timeout: float = LONGEST) -> Status:
         """Run the tree to its end, and drain its goals; return its status.
@@ -160,7 +160,7 @@ class VirtualRunner:
 
     def _note(self, event: Event) -> None:
         self.events.append(event)
-        self.state.observe(event)
+        self.state.fold(event)
         if isinstance(event, AttemptEnded):
             self.outcomes.append((self.state.nodes[event.node].node.name, event.outcome))
 

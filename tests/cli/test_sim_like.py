@@ -46,7 +46,7 @@ def outcomes(events: Iterable[Event | State]) -> list[tuple[tuple[str, ...], Out
     state, found = State(), []
     for event in events:
         assert not isinstance(event, State)
-        state.observe(event)
+        state.fold(event)
         if isinstance(event, AttemptEnded):
             found.append((state.path(event.node), event.outcome))
     return found

@@ -695,7 +695,7 @@ def test_a_tick_that_lasts_is_shown_with_its_node_and_how_long_it_has_lasted() -
         "tick     Work / Inner / Grasp: in its tick for 1.0 s",
         "tick     Work / Inner / Grasp: its tick has taken 15.5 s",
     ]
-    state.observe(story.lasts(grasp, 15.5, is_over=True))
+    state.fold(story.lasts(grasp, 15.5, is_over=True))
     assert why(state, story.time) == ["Work: running for 1.5 s"]
     view.close()
 

@@ -271,13 +271,13 @@ def test_a_late_reader_is_told_of_the_nodes_that_are_there_in_few_events(
     truth = State()
     for number in range(3, 6 * CHANGES + seed):
         for event in early.take():
-            truth.observe(event)
+            truth.fold(event)
         if len(leaves := truth.nodes[1].children) > CHANGES:
             stream.add(NodesRemoved, (chance.choice(leaves),))
         index = chance.randrange(len(leaves))
         stream.add(NodesAdded, (Node(number, 1, str(number), "wait", "", index=index),))
     for event in early.take():
-        truth.observe(event)
+        truth.fold(event)
     late = stream.reader().take()
     told = state_of(late)
     assert told.in_order() == truth.in_order()

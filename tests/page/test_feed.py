@@ -236,7 +236,7 @@ def test_where_files_are_missing_all_that_is_known_of_the_state_is_told(
             found = state_of(map(from_plain, each["events"]))
             found.now = from_plain({**each["events"][0], "at": each["at"]}).at
         else:
-            found.observe(from_plain(each))
+            found.fold(from_plain(each))
     assert told.has_no_gap
     assert [each["kind"] for each in told.plain].count("StateKnown") == 1
     expected = state_of(events)

@@ -60,7 +60,7 @@ def told(events: list[Event], count: int) -> dict[str, Any]:
     state, nodes = State(), dict[int, None]()
     for number, event in enumerate(events):
         if number < count:
-            state.observe(event)
+            state.fold(event)
         if isinstance(event, RunBegan | NodesAdded):
             nodes |= dict.fromkeys(node.id for node in event.nodes)
 
@@ -70,7 +70,7 @@ def told(events: list[Event], count: int) -> dict[str, Any]:
 
     last = State()
     for event in events:
-        last.observe(event)
+        last.fold(event)
     return {
         "begun": sorted(
             node for node in last.nodes if node in state.nodes and state.is_begun(node)
@@ -161,7 +161,7 @@ def test_the_state_is_the_same_where_events_are_missing(
     events = any_run(seed)
     state = State()
     for event in events[:700]:
-        state.observe(event)
+        state.fold(event)
     rest = [to_plain(each) for each in events[700:]]
     plain = [*(to_plain(each) for each in events[:100]), known(state), *rest]
     counts = [101, *range(105, len(plain), 50), len(plain)]

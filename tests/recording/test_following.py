@@ -32,7 +32,7 @@ def folded(items: list[Item]) -> State:
         if isinstance(item, State):
             state = item
         else:
-            state.observe(item)
+            state.fold(item)
     return state
 
 

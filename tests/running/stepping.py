@@ -32,7 +32,7 @@ class Stepped:
             self.backend,
             **given,
         )
-        self.loop.observe(self.told.append)
+        self.loop.observe_events(self.told.append)
 
     def begin(self, timeout: float | None = None) -> None:
         self.loop.begin(self.now, timeout)

@@ -234,7 +234,7 @@ class TestSetup:
         if who == "handler":
             tree.add_pre_tick_handler(replace)
         else:
-            stepped.loop.observe(replace)
+            stepped.loop.observe_events(replace)
         assert stepped.run() is Status.SUCCESS
         assert calls == ["setup new", "setup last", "new", "last"]
 
@@ -270,8 +270,8 @@ class TestEvents:
 
     def test_an_observer_that_raises_is_dropped_and_the_run_goes_on(self) -> None:
         stepped = Stepped(py_trees.behaviours.Success("s"))
-        stepped.loop.observe(faulty := Mock(side_effect=RuntimeError("on purpose")))
-        stepped.loop.observe(good := Mock())
+        stepped.loop.observe_events(faulty := Mock(side_effect=RuntimeError("on purpose")))
+        stepped.loop.observe_events(good := Mock())
         assert stepped.run() is Status.SUCCESS
         faulty.assert_called_once()
         assert isinstance(good.call_args.args[0], TreeFinished)

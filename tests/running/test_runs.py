@@ -184,7 +184,7 @@ class TestItsEnd:
 
         leaf = MoveRobot("m", 50.0)
         stage = Stage(together(Leaves("leaves"), leaf))
-        stage.runner.observe(observer)
+        stage.runner.observe_events(observer)
         with pytest.raises(SystemExit, match="7"):
             stage.runner.run()
         assert (leaf.end, stage.server.live_goals) == (End.CANCELED, [])

@@ -302,7 +302,7 @@ def test_an_observer_that_takes_its_time_is_told_of_once() -> None:
     def slow(event: Event) -> None:
         network.timeline.advance(network.timeline.now + 0.06)
 
-    runner.observe(slow)
+    runner.observe_events(slow)
     runner.run()
     said = [line for line in network.log.lines if "observer" in str(line)]
     assert len(said) == 1
@@ -387,12 +387,12 @@ def test_a_reader_that_comes_late_is_told_of_the_tree_first() -> None:
     runner.start()
     runner.advance(1.0)
     late: list[Event] = []
-    runner.observe(late.append)
+    runner.observe_events(late.append)
     runner.advance(20.0)
     assert isinstance(late[0], RunBegan)
     state = State()
     for event in late:
-        state.observe(event)
+        state.fold(event)
     assert (state.status, state.actions[0].outcome) == (Status.SUCCESS, "SUCCEEDED")
 
 
@@ -455,7 +455,7 @@ class TestWhatIsOdd:
         faults = ["move_robot:1:stall=0.4"]
         ScriptedServer(network, Move, "move_robot", script, faults=faults)
         runner = VirtualRunner(in_sequence(MoveRobot("m", 1.0)), network, heartbeat=0.1)
-        runner.observe(lambda event: None)
+        runner.observe_events(lambda event: None)
         runner.start()
         runner.advance(20.0)
         told = events_of(runner, FeedbackCame)

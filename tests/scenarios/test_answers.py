@@ -263,11 +263,11 @@ def test_what_a_stranger_tells_of_unknown_and_finished_goals_means_nothing(
     stranger = Stranger(context, name)
     try:
         with TreeRunner(first, node=node) as runner:
-            runner.observe(report.observe)
+            runner.observe_events(report.note_goal)
             assert runner.run(timeout=9.0) is Status.SUCCESS
         stranger.known = bytes.fromhex(first.history[0].goal_id)
         with TreeRunner(in_sequence(second, refused), node=node) as runner:
-            runner.observe(report.observe)
+            runner.observe_events(report.note_goal)
             assert runner.run(timeout=9.0) is Status.FAILURE
     finally:
         stranger.close()
@@ -466,7 +466,7 @@ def test_a_result_that_is_late_comes_while_a_newer_goal_of_the_same_leaf_runs(
     leaf.goal = lambda: {"distance": next(distances)}
     tree = in_turn(in_sequence(guard, Gate("other"), memory=False), leaf, memory=False)
     with TreeRunner(tree, node=node, heartbeat=0.01) as runner:
-        runner.observe(report.observe)
+        runner.observe_events(report.note_goal)
         runner.start()
         journal.wait_for("succeeded")
         guard.holds = True
@@ -519,7 +519,7 @@ def test_goals_over_their_deadline_at_a_server_that_answers_wrong(
     leaf.goal = lambda: {"distance": (AT_ONCE, TOO_LONG)[next(count) % 2]}
     done = FailureIsSuccess("whatever", child=leaf)
     with TreeRunner(py_trees.decorators.Repeat("ten", child=done, num_success=10), node=node) as r:
-        r.observe(report.observe)
+        r.observe_events(report.note_goal)
         assert r.run(timeout=60.0) is Status.SUCCESS
         until(lambda: r.unaccounted == [], 10.0, what="all accounted for")
     entries = journal.entries()

@@ -70,7 +70,7 @@ def test_many_robots_in_one_orchestrator(
     report = Report()
     began = time.monotonic()
     with TreeRunner(root, node=node) as runner:
-        runner.observe(report.observe)
+        runner.observe_events(report.note_goal)
         status = runner.run(timeout=550.0)
         failed = [leaf for leaf in root.iterate() if leaf.status is Status.FAILURE]
         assert status is Status.SUCCESS, [(leaf.name, leaf.feedback_message) for leaf in failed]

@@ -98,7 +98,7 @@ ON_THE_USERS_CONTEXT = """
     rclpy.init()
     leaf = MoveRobot("m", 9.0, action_name=name, timeout=T)
     runner = TreeRunner(leaf, executor=SingleThreadedExecutor())
-    runner.observe(said)
+    runner.observe_events(said)
     runner.run()
 """
 
@@ -129,7 +129,7 @@ TWO_RUNNERS = """
     leaves = [MoveRobot(x, 9.0, action_name=name + x, timeout=T) for x in ("", "_b")]
     runners = [TreeRunner(leaf) for leaf in leaves]
     for runner in runners:
-        runner.observe(said)
+        runner.observe_events(said)
     runners[1].start()
     runners[0].run()
 """
@@ -160,7 +160,7 @@ def test_a_signal_that_ends_a_process_ends_the_goals_of_all_its_runners(
 ONE_RUNNER = """
     leaf = MoveRobot("m", 9.0, action_name=name, timeout=Timeouts(server=30.0, cancel=CANCEL))
     runner = TreeRunner(leaf)
-    runner.observe(said)
+    runner.observe_events(said)
     WHERE
     threading.Event().wait(60.0)
 """
@@ -227,7 +227,7 @@ def test_a_goal_that_is_left_running_is_named_before_a_signal_ends_the_process(
 A_TICK_THAT_TAKES_LONG = """
     leaves = [MoveRobot(x, 9.0, action_name=name + x, timeout=T) for x in ("", "_b")]
     inner = TreeRunner(leaves[1])
-    inner.observe(said)
+    inner.observe_events(said)
 
     class TakesLong(py_trees.behaviour.Behaviour):
         def update(self):
@@ -315,7 +315,7 @@ A_PUBLISHER_IN_MID_GOAL = """
     from std_msgs.msg import String
     leaf = MoveRobot("m", 9.0, action_name=name, timeout=T)
     runner = TreeRunner(leaf)
-    runner.observe(said)
+    runner.observe_events(said)
     runner.start()
     executing.wait()
     time.sleep(3.0)  # all that it has announced so far is acknowledged
@@ -418,7 +418,7 @@ LOOKS_OUT = """
             print(event.outcome, event.end, flush=True)
     leaf = MoveRobot("m", 40.0, action_name=name, timeout=T)
     with TreeRunner(leaf) as runner:
-        runner.observe(told)
+        runner.observe_events(told)
         runner.run(60.0)
 """
 

@@ -988,7 +988,7 @@ class TestTwice:
         runner = TreeRunner(leaf, node=node)
         assert runner.run(30.0) is Status.SUCCESS
         told = list[Event]()
-        runner.observe(told.append)
+        runner.observe_events(told.append)
         other.thaw()
         until(lambda: not leaf.drained, 10.0)
         if loop == "a foreign loop":

@@ -102,9 +102,9 @@ def test_what_is_left_without_waiting_keeps_its_duration(leaf: FakeNode, story: 
     state = story.told(story.goal(leaf, "SENDING"), story.goal(leaf, "EXECUTING"))
     story.time += 5.0
     left = StopWanted(story._next(), "again", "left without waiting", abandons=True)
-    state.observe(left)
+    state.fold(left)
     assert state.abandoned
-    state.observe(RunEnded(left.at, 3, unaccounted=tuple(state.unaccounted)))
+    state.fold(RunEnded(left.at, 3, unaccounted=tuple(state.unaccounted)))
     action = only(state)
     assert (action.duration, action.outcome) == (pytest.approx(7.0), Outcome.CANCELED)
     assert action.end is End.UNKNOWN
@@ -121,9 +121,9 @@ def test_late_news_of_an_older_goal_leave_the_newer_one_alone(leaf: FakeNode, st
     action = only(state)
     told = action.attempts, action.visits, action.state, action.outcome
     assert told == (2, 2, "EXECUTING", None)
-    state.observe(story.goal(leaf, "DONE", visit=2, outcome=Outcome.SUCCEEDED))
+    state.fold(story.goal(leaf, "DONE", visit=2, outcome=Outcome.SUCCEEDED))
     assert action.live, "the older goal is still being canceled"
-    state.observe(story.goal(leaf, "DONE", visit=1, outcome=Outcome.CANCELED, end=End.CANCELED))
+    state.fold(story.goal(leaf, "DONE", visit=1, outcome=Outcome.CANCELED, end=End.CANCELED))
     assert not action.live
     assert (action.attempts, action.outcome) == (2, Outcome.SUCCEEDED)
 
@@ -134,7 +134,7 @@ def test_a_goal_that_is_still_canceling_is_live_though_its_leaf_has_an_outcome(
     canceled = {"outcome": Outcome.CANCELED, "end": End.UNKNOWN}
     state = story.told(story.goal(leaf, "EXECUTING"), story.goal(leaf, "CANCELING", **canceled))
     assert state.live == state.actions
-    state.observe(story.goal(leaf, "DONE", outcome=Outcome.CANCELED, end=End.CANCELED))
+    state.fold(story.goal(leaf, "DONE", outcome=Outcome.CANCELED, end=End.CANCELED))
     assert state.live == []
 
 
@@ -350,7 +350,7 @@ def test_a_failure_by_itself_is_not_that_of_what_is_below(leaf: FakeNode) -> Non
 
 def test_a_run_that_begins_anew_forgets_the_one_before(leaf: FakeNode, story: Story) -> None:
     state = story.told(*story.fail(leaf), story.finish(Status.FAILURE), Paused(story._next(), True))
-    state.observe(story.began)
+    state.fold(story.began)
     assert (state.actions, state.failures, state.finished) == ([], [], None)
     assert not state.paused
     assert state.status_of(1) is Status.INVALID
@@ -383,7 +383,7 @@ def test_the_state_keeps_what_was_told_of_variables_servers_pause_and_loss(story
 def test_the_first_wish_to_stop_counts_and_a_later_one_may_leave(story: Story) -> None:
     state = story.told(StopWanted(story._next(), "SIGINT", "interrupted by SIGINT"))
     assert not state.abandoned
-    state.observe(StopWanted(story._next(), "again", "left without waiting", abandons=True))
+    state.fold(StopWanted(story._next(), "again", "left without waiting", abandons=True))
     assert state.stop is not None
     assert (state.stop.who, state.abandoned) == ("SIGINT", True)
 

@@ -43,7 +43,7 @@ def action_of(story: Story, *events: Event) -> ActionStory:
 
 def words(state: State, exit_code: int = 0, **more: Any) -> list[str]:
     """The last words of a run that ended so."""
-    state.observe(RunEnded(state.now or NOWHERE, exit_code, **more))
+    state.fold(RunEnded(state.now or NOWHERE, exit_code, **more))
     return last_words(state)
 
 
@@ -52,7 +52,7 @@ def words(state: State, exit_code: int = 0, **more: Any) -> list[str]:
 
 def test_a_tree_that_never_started_took_no_time(story: Story) -> None:
     state = State()
-    state.observe(story.finish(Status.INVALID))
+    state.fold(story.finish(Status.INVALID))
     assert words(state, 1) == ["", "STOPPED after 0.00 s"]
 
 

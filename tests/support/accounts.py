@@ -13,7 +13,7 @@ class Report:
     def __init__(self) -> None:
         self.goals: dict[str, GoalChanged] = {}
 
-    def observe(self, event: Event) -> None:
+    def note_goal(self, event: Event) -> None:
         if isinstance(event, GoalChanged):
             self.goals[event.goal_id] = event
 

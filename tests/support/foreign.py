@@ -282,7 +282,7 @@ def _started(action: str, *, until_it_runs: bool = True) -> TreeRunner:
             executing.set()
 
     executing = threading.Event()
-    runner.observe(say)
+    runner.observe_events(say)
     runner.start()
     if until_it_runs:
         executing.wait()
@@ -309,7 +309,7 @@ def run_and_clean_up(action: str) -> None:
     """run() of a TreeRunner in a with-block, in mid-goal."""
     leaf = MoveRobot("m", 60.0, action_name=action, timeout=PATIENT)
     with TreeRunner(leaf) as runner:
-        runner.observe(
+        runner.observe_events(
             lambda event: (
                 print("executing", flush=True)
                 if isinstance(event, GoalChanged) and event.state == "EXECUTING"

@@ -14,7 +14,7 @@ def state_of(events: Iterable[Event]) -> State:
     """Return where a run stands after these events."""
     state = State()
     for event in events:
-        state.observe(event)
+        state.fold(event)
     return state
 
 
@@ -22,7 +22,7 @@ def changes_of(events: Iterable[Event]) -> list[tuple[tuple[str, ...], Status]]:
     """Return the path and the status of each change of a node."""
     state, changes = State(), []
     for event in events:
-        state.observe(event)
+        state.fold(event)
         if isinstance(event, NodeChanged):
             changes.append((state.path(event.node), event.status))
     return changes

@@ -353,7 +353,7 @@ class TestDeadlines:
         leaf = MoveRobot("m", 0.1, timeout=timeouts)
         ends = []
         with world.runner(leaf) as runner:
-            runner.observe(lambda event: ends.append(getattr(event, "end", None)))
+            runner.observe_events(lambda event: ends.append(getattr(event, "end", None)))
             runner.run(timeout=9.0)
             assert [report.goal_id for report in runner.unaccounted] == [leaf.history[0].goal_id]
         assert stood(leaf) == (Outcome.ACCEPT_TIMEOUT, End.UNKNOWN)
@@ -442,7 +442,7 @@ class TestDeadlines:
                 told.append(event.end)
 
         with world.runner(leaf) as runner:
-            runner.observe(tell)
+            runner.observe_events(tell)
             runner.run(timeout=20.0)
             assert leaf.end is told[-1] is End.UNKNOWN
             runner.until(lambda: leaf.history[0].goal.lost_result.status)
@@ -505,7 +505,7 @@ class TestServerLost:
                 add(kind, *args, **fields)
 
             stream.add = told  # type: ignore[method-assign, assignment]
-            runner.observe(lambda event: None)
+            runner.observe_events(lambda event: None)
             runner.start()
             runner.until(lambda: leaf.progress().state == "SENDING")
             world.servers["/move_robot"].close()

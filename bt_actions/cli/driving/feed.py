@@ -37,7 +37,7 @@ class Feed:
     def event(self, event: Event) -> None:
         """Take in an event, and show it, unless its node is not known: it is damaged, or late."""
         self._pass(event.at.steady)
-        self.state.observe(event)
+        self.state.fold(event)
         node = getattr(event, "node", None)
         if node is None or node in self.state.nodes:
             self._show(partial(self.view.event, event))

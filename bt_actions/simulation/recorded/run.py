@@ -62,7 +62,7 @@ class RecordedGoal:
     away: float = 0.0
     """Seconds for which its server was out of sight after it; infinity for good."""
 
-    def observe(self, event: GoalChanged) -> None:
+    def goal_changed(self, event: GoalChanged) -> None:
         """Take in what has become of the goal."""
         is_lost = event.outcome is Outcome.SERVER_LOST
         if event.state == "EXECUTING" and self.accepted is None:
@@ -150,7 +150,7 @@ class RecordedRun:
         self._absent: dict[str, list[RecordedGoal | ServerStory]] = {}
         """Servers that are out of sight, each with the goals that it had or has had then."""
         for event in events:
-            self._observe(event)
+            self._take(event)
 
     @property
     def remarks(self) -> list[str]:
@@ -174,7 +174,7 @@ class RecordedRun:
             said.append("feedback is played as it was recorded: at most five a second of each goal")
         return said
 
-    def _observe(self, event: Event) -> None:
+    def _take(self, event: Event) -> None:
         match event:
             case RunBegan():
                 self.began = event
@@ -203,7 +203,7 @@ class RecordedRun:
                 self._went(event.server, server.goals[-1] if server.goals else server)
             return
         is_over = goal.over is not None
-        goal.observe(event)
+        goal.goal_changed(event)
         if event.outcome is Outcome.SERVER_LOST and not is_over:
             self._went(event.server, goal)
 
