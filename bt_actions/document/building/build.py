@@ -95,8 +95,9 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
     for child in node.children:  # a comprehension would take a level of recursion of its own
         children.append(_node(child, context))  # noqa: PERF401
     behaviour = node.kind.build(node, context, *children)
-    gates = {key: node.values[key] for key in GATES if key in node.values}
-    if gates:
+    gates: dict[str, object] = {}
+    if not GATES.keys().isdisjoint(node.values):
+        gates = {key: node.values[key] for key in GATES if key in node.values}
         conditions = {key: context.why_not(key, written) for key, written in gates.items()}
         gate(behaviour, {key: context.said(each) for key, each in gates.items()}, **conditions)
     if context.topics:

@@ -62,7 +62,8 @@ def check_document(checker: Checker) -> None:
 def _check_form(checker: Checker, node: TreeNode) -> None:
     """Check what the forms of a kind's keys tell of it: condition, number, what it talks over."""
     for key in GATES:
-        checker.condition(node.values.get(key), {})
+        if key in node.values:
+            checker.condition(node.values[key], {})
     kind = node.kind
     form = kind.keys[kind.reads].shape if kind.reads in kind.keys else kind.value
     value = node.values.get(kind.reads)

@@ -208,11 +208,7 @@ class Checker:
     def received(self, node: TreeNode) -> FieldType | None:
         """The type of what comes back to a node: a result, an answer, a message."""
         cls, interface = self.class_of(node), node.kind.interface
-        return (
-            None
-            if cls is None or not interface
-            else Message(interface.part(cls, interface.received))
-        )
+        return _parts(cls, interface)[1][interface.root] if interface is not None else None
 
     def declared_type(self, declared: Declared | None) -> FieldType | None:
         """The type of an input or an output; None where it has none, which is told there."""
@@ -263,18 +259,22 @@ class Checker:
         if key in values and key in written:
             self.value(asked, values[key], written[key])
         self.condition(values.get("expect"), roots)
-        if interface.kind == "action":
-            roots_of_feedback = {"feedback": None if cls is None else Message(cls.Feedback)}  # type: ignore[attr-defined]
-            self.condition(values.get("until"), roots_of_feedback)
-        else:
-            self.condition(values.get("until"), roots)
+        if "until" in values:
+            until = roots
+            if interface.kind == "action":
+                until = {"feedback": None if cls is None else Message(cls.Feedback)}  # type: ignore[attr-defined]
+            self.condition(values["until"], until)
         if "retry" in values:
             self.condition(when_of(values), roots)
-        for key, more in zip(SAVES, ({}, {"outcome": TEXT}), strict=True):
-            for name, place in table_of(values.get(key)).items():
+        for key in SAVES:
+            if key not in values:
+                continue
+            saved = roots if key == "save" else {**roots, "outcome": TEXT}
+            for name, place in table_of(values[key]).items():
                 if isinstance(place, Computed):
-                    self.assigns(name, self.expression(place, {**roots, **more}), place.node)
-        for name in table_of(values.get(SAVES[0])).keys() & table_of(values.get(SAVES[1])).keys():
+                    self.assigns(name, self.expression(place, saved), place.node)
+        own, failed = (table_of(values.get(key)) for key in SAVES)
+        for name in own.keys() & failed.keys() if failed else ():
             text = f"{name!r} is saved of a success, too: nobody could tell which it is of"
             self.source.report("BT216", span_of(written[SAVES[1]]), text)
 

@@ -121,9 +121,11 @@ class Hazards:
 
     def _follows(self, node: TreeNode) -> None:
         """Report a goal that is to follow changes, and reads nothing that could change."""
-        settings = settings_of(node, self.document)
-        if settings.get("on_change", "ignore") == "ignore" or self.doubts.own(node):
+        shared = shared_settings(node.alias, self.document)
+        how = node.values.get("on_change") or shared.get("on_change", "ignore")
+        if how == "ignore" or self.doubts.own(node):
             return
+        settings = settings_of(node, self.document)
         reads = (each.expression.variables for each in computed_in(settings.get("goal")))
         if not any(reads):
             at = node.written.get("on_change", node.key)

@@ -14,7 +14,7 @@ from bt_actions.document.language.keys import ALIAS, TOP_KEYS, TOPIC
 from bt_actions.document.language.ros_names import INPUT, RosName
 from bt_actions.document.language.shapes import Key
 from bt_actions.document.language.values import computed_in
-from bt_actions.document.reading.tree import Document, table_of
+from bt_actions.document.reading.tree import Document, table_of, text_of
 from bt_actions.document.yaml.nodes import Node, span_of
 
 
@@ -34,8 +34,9 @@ def _names_in(document: Document) -> Iterator[tuple[str, Node]]:
         for declared in table.values():
             yield from _names(declared.values, keys, declared.parts)
     for node in document.nodes():
-        keys = {node.kind.name: Key(node.kind.name, node.kind.value, ""), **node.kind.keys}
-        yield from _names(node.values, keys, node.written)
+        for key in node.kind.ros_names:
+            if "$" in (name := text_of(node.values, key)) and key in node.written:
+                yield from ((each, node.written[key]) for each in INPUT.findall(name))
 
 
 def inputs_in_names(document: Document, known: dict[int, set[str]] | None = None) -> set[str]:

@@ -27,6 +27,7 @@ from bt_actions.document.language.keys import (
     ConditionOrNode,
     keyed,
 )
+from bt_actions.document.language.ros_names import RosName
 from bt_actions.document.language.scalars import Condition, NodeName, Shape
 from bt_actions.document.language.shapes import Key, required_in
 
@@ -156,6 +157,12 @@ class Kind:
         """The keys that hold nodes, in the order of the children; one may be its own."""
         own = (self.name,) if isinstance(self.value, ConditionOrNode) else ()
         return own + tuple(name for name, key in self.keys.items() if key.shape in (NODE, NODES))
+
+    @cached_property
+    def ros_names(self) -> tuple[str, ...]:
+        """The keys whose values are names of servers, topics or namespaces."""
+        forms = {self.name: self.value} | {name: key.shape for name, key in self.keys.items()}
+        return tuple(name for name, form in forms.items() if isinstance(form, RosName))
 
     @cached_property
     def is_action(self) -> bool:

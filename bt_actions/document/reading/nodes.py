@@ -145,6 +145,8 @@ class _Reader:
                 said = inner
         if said is not None and self._typed(written, said):
             return None
+        if len(kinds) == 1 and kinds[0].text not in _BESIDE_CHILD:
+            return kinds[0]
         alone = _BESIDE_CHILD if written.get("child") is None else ()
         held = {
             name

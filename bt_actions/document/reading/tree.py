@@ -167,9 +167,8 @@ def join_names(*parts: str) -> str:
 def merged(base: dict[str, object], over: dict[str, object]) -> dict[str, object]:
     """Two mappings of settings as one, key by key to any depth; `over` wins."""
     result = {**base, **over}
-    for name in base.keys() & over:
-        earlier, value = base[name], over[name]
-        if isinstance(earlier, dict) and isinstance(value, dict):
+    for name, earlier in base.items():
+        if isinstance(earlier, dict) and isinstance(value := over.get(name), dict):
             result[name] = merged(earlier, value)
     return result
 
@@ -264,6 +263,8 @@ def writes_of(node: TreeNode, document: Document) -> list[Write]:
     root = interface.root if interface is not None else None
     writes = []
     for key in SAVES:
+        if key not in values and (declared is None or key not in declared.values):
+            continue
         own, shared = table_of(values.get(key)), table_of(declared and declared.values.get(key))
         given = [pair for pair in shared.items() if pair[0] not in own]
         writes += [Write(name, node, "", value, "result") for name, value in given]
