@@ -1,6 +1,6 @@
-"""Whether a goal may be sent now, and what keeps it back.
+"""The admission of a goal: whether to send the request now, and the reason where not.
 
-Looks at what is known, and neither asks nor sends anything. All under the host's lock.
+Admission reads known facts. Nothing here asks or sends. The caller holds the host's lock.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from bt_actions.traffic import route
 from bt_actions.traffic.state import GoalHandle
 
 IN_FLIGHT = 8
-"""Goal requests of this process, of all its nodes, under way at a server; its queue holds 10, and
-drops what is over silently."""
+"""Goal requests under way at one server, of this process with all its nodes. The server's queue
+holds 10, and drops the rest silently."""
 BESIDE = 1.0
-"""Seconds for which a server may be in sight before another one that was there all the time, or
-that came back with it; 0.5 measured."""
+"""Seconds that a server may be in sight before a second one of its name is shown, though both were
+there, or came back together (0.5 measured)."""
 
 
 def finds_server(handle: GoalHandle, now: float) -> bool:
-    """Whether the goal wants one, and it is there, alone, and hears us."""
+    """Return whether the goal waits for a server, and that server is ready, alone, and hears us."""
     endpoint = handle.endpoint
     return (
         handle.goal.state is State.WAITING_FOR_SERVER
@@ -32,11 +32,10 @@ def finds_server(handle: GoalHandle, now: float) -> bool:
 
 
 def left_near(handle: GoalHandle) -> list[GoalHandle]:
-    """Return the goals of this process that were lost, or have given up their resources.
+    """Return lost and released goals of this process that share a server or resource with `handle`.
 
-    Those that share its server, or resources with it, which a goal that may still run must not
-    where it may not run beside another. One that was lost holds nothing any more; should its server
-    be back, it is canceled first.
+    A goal that may still run bars the goals that must not run beside it. A lost goal holds no
+    resource; should its server be back, the lost goal is canceled first.
     """
     goal, action = handle.goal, handle.endpoint.action
     return [
@@ -48,7 +47,7 @@ def left_near(handle: GoalHandle) -> list[GoalHandle]:
 
 
 def is_clear(handle: GoalHandle, now: float) -> bool:
-    """Whether there is room at its server, and nothing that was `left_near` may run beside it."""
+    """Return whether the server has room, and no goal that was `left_near` bars this one."""
     endpoint = handle.endpoint
     at_server = [each for each in endpoint.domain.open if each.action == endpoint.action]
     in_flight = sum([each.goal.in_flight for one in at_server for each in one.goals.values()])
@@ -69,7 +68,7 @@ def why_not(handle: GoalHandle) -> str:
             if other.goal.outcome is not None and not other.accounted_for:
                 told = other.goal.cancel_said
                 return f": goal {other.goal.id.hex()} of {other.name} has not ended there{told}"
-        return ""  # one that just runs has it
+        return ""  # the holder simply runs
     if any(each.goal.outstanding for each in left_near(handle)):
         return ": what it would use still has a goal that was given up, and would run both"
     if _may_overtake(handle):
@@ -78,9 +77,9 @@ def why_not(handle: GoalHandle) -> str:
 
 
 def _may_overtake(handle: GoalHandle) -> bool:
-    """Whether the request of a goal that it replaces, or that replaces it, is under way.
+    """Return whether the request of a goal that replaces this one, or is replaced by it, is open.
 
-    From two nodes they arrive in any order, and the server runs the last one.
+    Requests of two nodes arrive in any order, and the server runs the last one.
     """
     holders = handle.endpoint.domain.resources.holders(handle.goal.resources)
     at, action = holders.index(handle), handle.endpoint.action

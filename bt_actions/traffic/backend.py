@@ -1,8 +1,9 @@
-"""What `setup(node=...)` resolves to: all that a leaf, or a run, asks of the world, as protocols.
+"""The world as a leaf or a run needs it, as protocols: what `setup(node=...)` resolves to.
 
-The third part of the seam, beside transport.py and host.py, for what is above traffic/: behaviours/
-and running/ use it, and nothing in traffic/. ros/node_participant.py keeps these protocols over
-rclpy, for one node; testing/backend.py without a node. Nothing of ROS is imported here.
+This is the third part of the seam, beside transport.py and host.py, for the rooms above traffic/:
+behaviours/ and running/. Nothing in traffic/ uses this part. ros/node_participant.py implements
+these protocols over rclpy, for one node; testing/backend.py needs no node. Nothing of ROS is
+imported here.
 """
 
 from __future__ import annotations
@@ -17,24 +18,24 @@ if TYPE_CHECKING:
     from bt_actions.traffic.traffic import Traffic
 
 LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
-"""What lines of a log may be called, and Python's numbers for it."""
+"""The levels of a log line, with Python's numbers for them."""
 
 ARRIVES = 1.0
-"""Seconds that a message is given to arrive: the first one, once its publisher is in sight, and
-what we have published, before the process ends."""
+"""Seconds in which a message arrives: a first message, once the publisher is in sight, and a last
+message, before the process ends."""
 
 
 class Call(Protocol):
-    """A call of a service, as futures are."""
+    """A call of a service, in the form of a future."""
 
     def done(self) -> bool:
-        """Whether the answer is here."""
+        """Return whether the answer is here."""
 
     def result(self) -> Any:
-        """The answer of a call that is done."""
+        """Return the answer of a call that is done."""
 
     def cancel(self) -> object:
-        """Take no interest in an answer any more."""
+        """Give up the call: its answer is dropped."""
 
 
 class Connection(Protocol):
@@ -44,10 +45,13 @@ class Connection(Protocol):
     """The topic's or the service's full name."""
 
     def why_nobody(self) -> str:
-        """What explains that nobody is at the other end, behind a colon; or an empty text."""
+        """Say, behind a colon, why nobody is at the other end.
+
+        Return "" where nothing explains that.
+        """
 
     def close(self) -> None:
-        """Let go of it; where we publish, once all have it, or a second after the last message."""
+        """Close the connection; a publisher waits, a second at most, for its messages to arrive."""
 
 
 class Service(Connection, Protocol):
@@ -58,28 +62,28 @@ class Service(Connection, Protocol):
         """Whether the service is there."""
 
     def call(self, request: Any) -> Call:
-        """Begin a call, which wakes who has called when it is done."""
+        """Begin a call; the answer wakes the run of the caller."""
 
 
 class Subscription(Connection, Protocol):
-    """One topic, listened to."""
+    """One topic, with a reader here."""
 
     def may_come(self) -> float:
-        """Seconds for which a first message may be on its way; 0 afterwards."""
+        """Return the seconds in which a first message may still be on its way; 0 afterwards."""
 
 
 class Publisher(Connection, Protocol):
-    """One topic, spoken on."""
+    """One topic, with a writer here."""
 
     @property
     def listeners(self) -> int:
-        """How many subscriptions get what is published."""
+        """The number of subscriptions that get each message."""
 
     def may_come(self) -> float:
-        """Seconds for which a listener may be there that is not discovered yet; 0 afterwards."""
+        """Return the seconds in which a listener may still be undiscovered; 0 afterwards."""
 
     def publish(self, message: Any) -> None:
-        """Publish; returns at once."""
+        """Publish a message, and return at once."""
 
 
 @runtime_checkable
@@ -90,27 +94,30 @@ class Backend(Protocol):
     """The goals of this node."""
 
     randomness: random.Random
-    """What varies the pauses before retries."""
+    """The source of variation for the pauses before retries."""
 
     def now(self) -> Now:
-        """This moment, by the steady clock and by the node's own."""
+        """Return this moment, by the steady clock and by the node's own."""
 
     def stamp(self) -> int:
-        """The node's own clock in nanoseconds, as the headers of messages have it."""
+        """Return the node's own clock in nanoseconds, as the headers of messages have it."""
 
     def service(self, service_type: type, name: str) -> Service:
-        """Become a client of a service. Raises TwoTypes, as the next two do."""
+        """Open a client of a service.
+
+        Raises TwoTypes where the name is in use here with another type; so do the next two.
+        """
 
     def subscription(
         self, message_type: type, topic: str, qos: str, take: Callable[[Any], None]
     ) -> Subscription:
-        """Listen; `take` is called with each message, on any thread, and only takes note of it.
+        """Open a subscription; `take` gets each message, on any thread, and only stores it.
 
-        `qos` is as the tree language calls it.
+        `qos` is a name of the tree language.
         """
 
     def publisher(self, message_type: type, topic: str, qos: str) -> Publisher:
-        """Become a publisher."""
+        """Open a publisher."""
 
     def log(self, level: str, text: str) -> None:
-        """Write a line of the tree's; `level` is one of `LEVELS`."""
+        """Write a line of the tree to the log; `level` is one of `LEVELS`."""

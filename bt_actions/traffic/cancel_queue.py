@@ -1,10 +1,10 @@
-"""The cancel requests to one server, of which only so many are under way at a time.
+"""The queue of cancel requests to one server, with a bound on requests under way.
 
-A server keeps the last ten requests of all its clients together and drops the others silently:
-sixty goals that are interrupted in one moment would run for a second more, until they are canceled
-again. So what is over waits for an answer, or until one is not expected any more; first come first
-served, of all endpoints to the server. Who is to be canceled, and when again, is for goals/goal.py
-to decide. All under the host's lock.
+A server keeps the last ten requests of all its clients together, and drops the others silently.
+Sixty goals that are interrupted in one moment would run for a second more, until they are canceled
+again. So further requests wait for an answer, or for the end of the time for one; first come, first
+served, over all endpoints to the server. Which goal is canceled, and when again, is for
+goals/goal.py to decide. The caller holds the host's lock.
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from __future__ import annotations
 from bt_actions.traffic.state import Endpoint
 
 AT_MOST = 8
-"""Requests of this process without an answer at one server: two places are left to others."""
+"""Requests of this process without an answer at one server: two places of ten are left to others.
+"""
 ANSWERED_WITHIN = 1.0
-"""Seconds until a request counts as lost, or its server as busy, and the next one is sent."""
+"""Seconds until a request counts as lost, or its server as busy, and the next request goes out."""
 
 
 def ask_to_cancel(endpoint: Endpoint, goal_id: bytes) -> None:
@@ -24,26 +25,26 @@ def ask_to_cancel(endpoint: Endpoint, goal_id: bytes) -> None:
 
 
 def make_room(endpoint: Endpoint, goal_id: bytes, now: float) -> None:
-    """Take note of an answer (seconds, steady clock)."""
+    """Take note of an answer (`now`: seconds, steady clock), and send what waited for its place."""
     endpoint.cancels.asked.pop(goal_id, None)
     send_more(endpoint, now)
 
 
 def forget(endpoint: Endpoint, goal_id: bytes) -> None:
-    """Ask no more for this goal."""
+    """Drop the requests for this goal."""
     endpoint.cancels.waiting.pop(goal_id, None)
     endpoint.cancels.asked.pop(goal_id, None)
 
 
 def send_now(endpoint: Endpoint, goal_id: bytes) -> None:
-    """Send what waits for this goal, room or not: there may be no other time."""
+    """Send the request that waits for this goal, room or not: there may be no other time."""
     sender = endpoint.cancels.waiting.pop(goal_id, None)
     if sender is not None:
         send_cancel(sender, goal_id)
 
 
 def send_more(endpoint: Endpoint, now: float) -> None:
-    """Send what the server has room for, of all endpoints to it (seconds, steady clock)."""
+    """Send as many requests to the server as it has room for (`now`: seconds, steady clock)."""
     waiting, asked = endpoint.cancels.waiting, endpoint.cancels.asked
     for goal_id in [each for each, at in asked.items() if now - at >= ANSWERED_WITHIN]:
         del asked[goal_id]
@@ -54,10 +55,10 @@ def send_more(endpoint: Endpoint, now: float) -> None:
 
 
 def send_cancel(endpoint: Endpoint, goal_id: bytes) -> bool:
-    """Ask the server now; return whether the request has left."""
+    """Send a cancel request now; return whether the request has left."""
     try:
         endpoint.transport.cancel(goal_id)
-    except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
+    except Exception as error:  # noqa: BLE001 - the middleware's: any; a later turn asks again
         endpoint.warn_once("CANCEL could not be sent", error)
         return False
     return True

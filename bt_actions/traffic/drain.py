@@ -1,8 +1,8 @@
-"""Sees, under one deadline, to goals that nobody wants any more until they are accounted for.
+"""The drain: goals that nobody wants any more are canceled and accounted for, under one deadline.
 
-It cancels them, takes what is answered, and gives up in the end: no goal is waited for twice. What
-becomes of a goal is for goals/goal.py to decide, and when to ask anew, too. `Drain` never waits;
-`drain` does, on the host's condition.
+A drain cancels its goals, takes answers, and gives up in the end: no goal is waited for twice. What
+becomes of a goal, and when to ask anew, is for goals/goal.py to decide. `Drain` never waits;
+`drain` waits on the host's condition.
 """
 
 from __future__ import annotations
@@ -18,11 +18,12 @@ from bt_actions.traffic.state import GoalHandle, Host
 from bt_actions.utilities.stepping import Done, Sleep
 
 JUST_PAST = 0.1
-"""Seconds by which a drain outlasts the goals' own deadlines, so that they take effect in it."""
+"""Seconds by which a drain outlasts the goals' own deadlines, so that these take effect within it.
+"""
 LAST_REQUESTS = 0.4
-"""Seconds, at most, in which cancel requests go out that waited for room when it was given up."""
+"""Seconds, at most, after the drain gives up, for cancel requests that waited for room."""
 LOOK = 0.005
-"""Seconds between two looks, where nothing wakes it."""
+"""Seconds between two looks, where nothing wakes the drain."""
 
 
 def drain(
@@ -30,9 +31,9 @@ def drain(
 ) -> list[GoalHandle]:
     """Cancel these goals and wait until each is accounted for, under one deadline.
 
-    Answers are taken here too, so it does not matter whether anybody spins, whether the context is
-    valid, or on which thread this runs. `hurry` is called again and again without the lock, and
-    ends the wait early when it says so. Returns the goals whose end is UNKNOWN, or may be.
+    The drain takes answers itself, so that a spinning executor, a valid context and a certain
+    thread are not needed. `hurry` is called again and again without the lock; True ends the wait
+    early. Returns the goals whose end is UNKNOWN, or may be.
     """
     drains = Drain(host, handles)
     while isinstance(step := drains.step(host.steady(), hurry=hurry()), Sleep):
@@ -44,14 +45,15 @@ def drain(
 class Drain:
     """The drain of some goals, step by step.
 
-    Its deadline is the largest `timeout.cancel` among them, plus `timeout.accept` (twice, if that
-    is more) where the acceptance is open. Where this process stood still, it leaves time for what
-    is about to arrive, and for one more question; and where a server went away in silence, for its
-    return, as it may only have stood still: what it still runs is canceled then.
+    Its deadline is the largest `timeout.cancel` of the goals, plus `timeout.accept` (twice, if that
+    is more) where the acceptance is open. After a stall of this process the drain leaves time for
+    answers that are about to arrive, and for one more question. After a server went away in silence
+    the drain leaves time for its return: the server may only have stood still, and a goal that runs
+    there is canceled then.
     """
 
     def __init__(self, host: Host, handles: Iterable[GoalHandle]) -> None:
-        """Cancel them."""
+        """Cancel the goals."""
         self._host = host
         with host.lock:
             self._wanted = [
@@ -73,11 +75,10 @@ class Drain:
             self._allow(host.steady())
 
     def step(self, now: float, *, hurry: bool = False) -> Sleep | Done[list[GoalHandle]]:
-        """Take what has come and do what is due (`now`: seconds, steady clock).
+        """Take answers and do what is due (`now`: seconds, steady clock).
 
-        With `hurry`, wait no longer for ends; cancel requests that wait for room still go out,
-        because whoever drains may end the process now. In the end returns the goals whose end is
-        UNKNOWN, or may be.
+        `hurry` ends the wait; cancel requests that wait for room still go out, because the process
+        may end now. The last step returns the goals whose end is UNKNOWN, or may be.
         """
         with self._host.lock:
             if self._gives_up_at is None:
@@ -104,7 +105,7 @@ class Drain:
             deliver_arrived(endpoint)
 
     def _is_over(self, now: float) -> bool:
-        """Whether nobody waits any longer."""
+        """Return whether no goal is waited for any longer."""
         if not self._waits:
             return True
         doubtful = any(in_doubt(handle.endpoint, now) for handle in self._waits)
@@ -115,7 +116,7 @@ class Drain:
         return not looks_out and now >= max(self._not_before, *self._until.values())
 
     def _allow(self, now: float) -> None:
-        """Give each goal the time that its cancel may take, and once more when it is back."""
+        """Give each goal the time that its cancel may take, and again when its server is back."""
         for handle in self._waits:
             is_back = handle in self._lost and not handle.goal.lost
             if not handle.looked_out_for:
@@ -127,5 +128,5 @@ class Drain:
 
 
 def _may_end(handle: GoalHandle) -> bool:
-    """Whether its end is not known and may become known: nothing more comes of what is done."""
+    """Return whether the goal's end is unknown and may become known; a DONE goal tells no more."""
     return not handle.is_over and handle.goal.state is not State.DONE

@@ -1,9 +1,9 @@
-"""Tells goals what happens, and does what they decide.
+"""The driver of goals: a goal is told what happens, and the driver does what the goal decides.
 
-A goal decides at once, whoever tells it something (`tell`). What follows waits in one queue of its
-domain and is done in the order of decision (`_do_in_order`), so nothing is done by recursion. Only
-a cancel looks again at what is true by then. A goal request that does not leave is told to the
-goal. All under the host's lock.
+`tell` has a goal decide at once. The effects of the decision wait in one queue of the domain, and
+`_do_in_order` does them in the order of decision, so that nothing is done by recursion. Only a
+cancel looks again at what is true by then. A goal request that does not leave is told to the goal.
+The caller holds the host's lock.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from bt_actions.traffic.state import Ended, Endpoint, Entry, GoalHandle, Standin
 from bt_actions.traffic.transport import GOALS_KEPT
 
 Effect = Callable[[GoalHandle], None]
-"""What is done for a goal."""
+"""One thing to do for a goal."""
 
 
 # What happens
 
 
 def tell(handle: GoalHandle, event: Event, detail: Any = None) -> None:
-    """Tell a goal what happened and do what it says."""
+    """Tell a goal what happened, and do what the goal decides."""
     with handle.endpoint.host.lock:
         endpoint = handle.endpoint
         if not endpoint.is_parents:
@@ -37,19 +37,19 @@ def tell(handle: GoalHandle, event: Event, detail: Any = None) -> None:
 
 
 def tell_believed(handle: GoalHandle, told: Told) -> None:
-    """Tell a goal what is believed of what was said of it, or seen."""
+    """Tell a goal the event that Replies made of an answer or a look; None is no event."""
     if told is None:
         return
     event, detail = told
     if event is Event.RESULT and detail[0] != STATUS_SUCCEEDED and _rival_sent(handle):
-        tell(handle, Event.REPLACED)  # this has overtaken the rival's acceptance
+        tell(handle, Event.REPLACED)  # the result has overtaken the rival's acceptance
     tell(handle, event, detail)
     if event is Event.SERVER_AMBIGUOUS and detail is not None:  # both have told how it ended
         tell(handle, Event.RESULT, detail)
 
 
 def _rival_sent(handle: GoalHandle) -> bool:
-    """Whether a newer goal that replaces this one is on its way, or has arrived."""
+    """Return whether a newer goal that replaces this one is on its way, or has arrived."""
     holders = handle.endpoint.domain.resources.holders(handle.goal.resources)
     newer = holders[holders.index(handle) + 1 :] if handle in holders else []
     return any(other.goal.busy is Busy.REPLACE and other.goal.sent for other in newer)
@@ -58,9 +58,10 @@ def _rival_sent(handle: GoalHandle) -> bool:
 def apply_deadlines(handle: GoalHandle) -> None:
     """Let the goal's deadlines take effect, unless its tree is paused before sending.
 
-    What has arrived by now is taken in first: an answer that came in time is in time, though the
-    executor was too busy to look. Where this whole process stood still, it may be about to arrive.
-    One moment decides whether to do so, and what is due. What fails in it stops nothing.
+    Arrived answers are taken in first: an answer that came in time is in time, though the executor
+    was too busy to look. After a stall of the process the answer may be about to arrive. One moment
+    decides both whether to take answers, and which deadlines have passed. An error here stops no
+    other goal.
     """
     endpoint, goal = handle.endpoint, handle.goal
     with endpoint.host.lock:
@@ -87,7 +88,7 @@ def apply_deadlines(handle: GoalHandle) -> None:
 
 
 def _give_back_time(handle: GoalHandle, now: float) -> None:
-    """See to it that no deadline counts the time in which a goal is not sent on our account."""
+    """Postpone the deadlines of an unsent goal by the time in which this side held it back."""
     if handle.held_back_since is not None and not handle.goal.sent:
         handle.goal.deadlines.postpone(now - handle.held_back_since)
     waits = handle.goal.state is State.WAITING_FOR_SERVER
@@ -96,7 +97,7 @@ def _give_back_time(handle: GoalHandle, now: float) -> None:
 
 
 def _suspend_after_stall(handle: GoalHandle, now: Now) -> None:
-    """Suspend deadlines that have passed while a stall may be why nothing has come in."""
+    """Suspend deadlines that have passed while a stall may be the reason for the silence."""
     goal, endpoint, stalls = handle.goal, handle.endpoint, handle.endpoint.host.stalls
     waits = goal.state is State.WAITING_FOR_SERVER
     doubts = route.holds_back if waits else route.in_doubt
@@ -106,7 +107,7 @@ def _suspend_after_stall(handle: GoalHandle, now: Now) -> None:
 
 
 def _apply(handle: GoalHandle, event: Event, now: Now, detail: Any = None) -> None:
-    """Have the goal take a step, and do what follows from it."""
+    """Have the goal take a step, and do its effects."""
     goal, endpoint, host = handle.goal, handle.endpoint, handle.endpoint.host
     waited = goal.state in (State.QUEUED, State.WAITING_FOR_SERVER)
     host.trace.tells(handle, event)
@@ -125,11 +126,11 @@ def _apply(handle: GoalHandle, event: Event, now: Now, detail: Any = None) -> No
 
 
 def _what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[Effect]:
-    """Yield what is to be done after a step of a goal, in order."""
+    """Yield the effects of a goal's step, in order."""
     before, now = handle.standing, Standing.of(handle)
     handle.standing = now
     turned_lost = (now.state is State.LOST) != (before.state is State.LOST)
-    if turned_lost:  # first: a process that is killed when that is told has it on record
+    if turned_lost:  # first: a process that is killed at the telling has the goal on record
         yield _update_record
     if now.shown != before.shown:
         yield report
@@ -149,9 +150,9 @@ def _what_follows(handle: GoalHandle, commands: Iterable[Command]) -> Iterator[E
 
 
 def _do_in_order(handle: GoalHandle, effects: Iterable[Effect]) -> None:
-    """Do these for a goal behind what was decided before, and what is meanwhile behind these.
+    """Do these effects behind those decided before; effects decided meanwhile come last.
 
-    Where that is under way, whoever has begun it does all.
+    Where effects are being done already, the caller further up does these as well.
     """
     domain = handle.endpoint.domain
     domain.effects.extend([(effect, handle) for effect in effects])
@@ -175,7 +176,7 @@ def _release(handle: GoalHandle) -> None:
 
 
 def _send(handle: GoalHandle) -> None:
-    """Count who gets it, have it on record, and send the request."""
+    """Count the receivers, put the goal on record, and send the request."""
     endpoint, goal, replies = handle.endpoint, handle.goal, handle.replies
     try:
         replies.count_receivers(endpoint.watch)
@@ -183,7 +184,7 @@ def _send(handle: GoalHandle) -> None:
         endpoint.transport.send(goal.id, goal.message)
         known = replies.sent_to
         route.glance(endpoint)
-        replies.count_receivers(endpoint.watch)  # who opened since got it, too
+        replies.count_receivers(endpoint.watch)  # a server that opened since got the request, too
         if replies.sent_to != known:
             _put_on_record(handle)
     except Exception as error:  # noqa: BLE001 - the handle's, or TypeError of a wrong message
@@ -193,7 +194,7 @@ def _send(handle: GoalHandle) -> None:
 def _ask_result(handle: GoalHandle) -> None:
     try:
         handle.endpoint.transport.ask_result(handle.goal.id)
-    except Exception as error:  # noqa: BLE001 - the middleware's: any; it is asked again later
+    except Exception as error:  # noqa: BLE001 - the middleware's: any; a later step asks again
         handle.endpoint.warn_once("ASK_RESULT could not be sent", error)
 
 
@@ -233,9 +234,9 @@ def report(handle: GoalHandle) -> None:
 
 
 def _wake_waiting(handle: GoalHandle) -> None:
-    """Wake those of all nodes whose goals may have waited for this one.
+    """Wake the runs of all nodes whose goals may have waited for this one.
 
-    There may be room at its server, or no conflict any more.
+    The server may have room now, or a conflict may be over.
     """
     endpoint, resources = handle.endpoint, handle.goal.resources
     unsent = endpoint.domain.unsent
@@ -245,7 +246,7 @@ def _wake_waiting(handle: GoalHandle) -> None:
 
 
 def _replace(handle: GoalHandle) -> None:
-    """Tell older goals on its resources that it has taken their place."""
+    """Tell older goals on the same resources that this goal has taken their place."""
     for older in handle.endpoint.domain.resources.holders(handle.goal.resources):
         if older is handle:
             break
@@ -253,7 +254,7 @@ def _replace(handle: GoalHandle) -> None:
 
 
 def _update_record(handle: GoalHandle) -> None:
-    """Take it off the record, or put on it what more is known of it, if it is there."""
+    """Take the goal off the record, or add to the record what is known by now."""
     record = handle.endpoint.host.record
     if handle.standing.off_record:
         record.strike(handle.goal.id)
@@ -272,7 +273,7 @@ def _put_on_record(handle: GoalHandle) -> None:
 
 
 def take_in(endpoint: Endpoint, handle: GoalHandle) -> None:
-    """Have the endpoint see to this goal from now on; it may have been another's."""
+    """Hand this goal to the endpoint, which may take it from another one."""
     if handle.endpoint is not endpoint:
         handle.endpoint = endpoint
         handle.replies.taken_over()
@@ -286,9 +287,9 @@ def take_in(endpoint: Endpoint, handle: GoalHandle) -> None:
 
 
 def retire(handle: GoalHandle) -> None:
-    """Have its endpoint see to this goal no more; without any goal, to the server neither."""
+    """Take this goal from its endpoint; without goals, the endpoint stops to watch its server."""
     goal, endpoint = handle.goal, handle.endpoint
-    if endpoint.goals.get(goal.id) is handle:  # and not what has turned up again
+    if endpoint.goals.get(goal.id) is handle:  # and not the goal that has turned up again
         del endpoint.goals[goal.id]
         endpoint.domain.left.pop(handle, None)
         endpoint.transport.forget(goal.id)
@@ -306,7 +307,7 @@ def retire(handle: GoalHandle) -> None:
 
 
 def _keep_ended(handle: GoalHandle) -> None:
-    """Remember what endpoint.py wants to know of a goal that is DONE."""
+    """Keep the facts of a DONE goal that endpoint.py needs."""
     goal, endpoint = handle.goal, handle.endpoint
     endpoint.ended[goal.id] = Ended(
         goal.timeouts, goal.resources, goal.busy,
@@ -323,7 +324,7 @@ def _keep_ended(handle: GoalHandle) -> None:
 def close_if_unused(endpoint: Endpoint) -> None:
     """Close the transport of an endpoint that has no user and no open goal.
 
-    Not before it has delivered all: a second server may have taken the last goal, too.
+    The transport first delivers all it has: a second server may have taken the last goal, too.
     """
     unused = endpoint.users <= 0 and not endpoint.goals and not endpoint.transport.has_more
     if unused and endpoint.of_node.get(endpoint.name) is endpoint:

@@ -1,8 +1,8 @@
-"""What the world calls of an endpoint: answers come, and time passes.
+"""The calls of the world to an endpoint: answers come, and time passes.
 
-What a server says is weighed (servers/replies.py), and told to the goal that it is about
-(driver.py). Nothing is decided here about a goal, about who is alive (servers/presence.py), nor
-whether a goal may be sent (admission.py). All under the host's lock.
+The word of a server is weighed (servers/replies.py), and told to the goal in question (driver.py).
+Nothing here decides about a goal, about living servers (servers/presence.py), or about sending
+(admission.py). The caller holds the host's lock.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from bt_actions.utilities.ids import author_of
 DELIVER_EVERY = 0.01
 """Seconds between two takes of answers, where nobody spins."""
 TOLD_AT_MOST = 10
-"""Goals of one action that are named; who left more left them in the same way."""
+"""Goals of one action that the log names; a sender of more left them in the same way."""
 
 
 class ActionEndpoint(Endpoint):
-    """An endpoint, with what its transport and the scheduler call."""
+    """An endpoint with the methods that its transport and the scheduler call."""
 
     def __repr__(self) -> str:
         return f"<ActionEndpoint {self.name}, {len(self.goals)} goals>"
@@ -37,7 +37,7 @@ class ActionEndpoint(Endpoint):
     def answer_came(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
     ) -> None:
-        """Tell a goal of ours what is believed of an answer; others are a probe's, or too late."""
+        """Weigh an answer and tell the goal; answers for other ids are a probe's, or late."""
         if self.is_parents:
             return
         now = self.watch.heard_at = self.host.steady()
@@ -53,7 +53,7 @@ class ActionEndpoint(Endpoint):
             _ended_answered(self, request, goal_id, asked, answers)
 
     def feedback_came(self, goal_id: bytes, feedback: Any) -> None:
-        """Tell a goal of ours of its feedback, and keep that for the leaf."""
+        """Tell a goal of ours its feedback, and keep that for the leaf."""
         handle = self.goals.get(goal_id)
         if handle is None:
             _ended_runs(self, goal_id)
@@ -71,7 +71,7 @@ class ActionEndpoint(Endpoint):
         """Tell our goals their statuses: each proves that the server has accepted the goal."""
         running = []
         for goal_id, status in statuses.items():
-            if goal_id not in self.goals:  # nearly all, of a server that keeps what has ended
+            if goal_id not in self.goals:  # nearly all, at a server that keeps ended goals
                 if 0 < status < STATUS_SUCCEEDED:
                     _ended_runs(self, goal_id)
                     running.append(goal_id)
@@ -81,13 +81,13 @@ class ActionEndpoint(Endpoint):
         warn_of_dead(self.name, running, self.left_by_dead, self.host.log)
 
     def all_delivered(self) -> None:
-        """Let go of the transport, if it was kept for what has just been delivered."""
+        """Close the transport, if a delivery that is over now was all that kept it."""
         close_if_unused(self)
 
     def _heard_of(self, goal_id: bytes, *, denies: bool = False) -> GoalHandle | None:
-        """Return the goal that an answer is about; of one of several it counts who is in sight.
+        """Return the goal of an answer, and look who is in sight where several servers may have it.
 
-        One that denies it may be the word of another server than the goal's.
+        A denial may be the word of another server than the goal's, and is then no sign of life.
         """
         handle = self.goals.get(goal_id)
         if handle is not None:
@@ -100,7 +100,7 @@ class ActionEndpoint(Endpoint):
     # Time passes (scheduler.Scheduled)
 
     def run_due(self, now: float) -> float:
-        """Look, send and apply deadlines as far as due; return the seconds until there is more."""
+        """Look, send and apply deadlines as far as due; return the seconds until more is due."""
         if not self.goals:
             return watcher.look_early(self, now)
         wait = watcher.look_if_due(self, now)
@@ -114,15 +114,15 @@ class ActionEndpoint(Endpoint):
         return wait
 
 
-# A goal that has ended is canceled should it turn up at a second server of the name, which took it,
-# too. But what is heard of it may also be older than its end. A cancel request tells: a server that
-# has ended a goal neither agrees to cancel it nor refuses.
+# An ended goal may turn up at a second server of the name, which took the request, too, and is
+# canceled there. But an answer may also be older than the goal's end. A cancel request tells the
+# two cases apart: a server that has ended a goal neither agrees to cancel it nor refuses.
 
 
 def _ended_answered(
     endpoint: Endpoint, request: Request, goal_id: bytes, asked: float, answers: Sequence[Any]
 ) -> None:
-    """Take an answer. An acceptance may have been overtaken by the result, or have come twice."""
+    """Take an answer for an ended goal: a late acceptance, a doubled one, or a second server's."""
     ended = endpoint.ended.get(goal_id)
     if ended is None:
         return
@@ -133,12 +133,12 @@ def _ended_answered(
         is_news = not ended.accepted and sum(answers) == 1
         if is_news or _may_be_several(endpoint, ended):
             _turns_up(endpoint, goal_id, ended)
-        elif sum(answers) > 1:  # by one, twice, or by one that is not shown yet
+        elif sum(answers) > 1:  # one server accepted twice, or the second is not shown yet
             _try_to_cancel(endpoint, goal_id, ended)
 
 
 def _ended_runs(endpoint: Endpoint, goal_id: bytes) -> None:
-    """Take feedback, or a status that shows that the goal runs: is it older than its end?"""
+    """Take feedback, or a status, that shows an ended goal running: ask by canceling."""
     ended = endpoint.ended.get(goal_id)
     if ended is not None and _may_be_several(endpoint, ended):
         _try_to_cancel(endpoint, goal_id, ended)
@@ -157,7 +157,7 @@ def _may_be_several(endpoint: Endpoint, ended: Ended) -> bool:
 
 
 def _turns_up(endpoint: Endpoint, goal_id: bytes, ended: Ended) -> None:
-    """A second server runs it: cancel it, and account for it like for any goal."""
+    """Cancel an ended goal that a second server runs, and account for it like for any goal."""
     del endpoint.ended[goal_id]
     goal = Goal(
         goal_id, endpoint.name, ended.timeouts, endpoint.participant.now(),
@@ -173,10 +173,11 @@ def _turns_up(endpoint: Endpoint, goal_id: bytes, ended: Ended) -> None:
 
 
 def warn_of_dead(action: str, running: Collection[bytes], told: set[bytes], log: Log) -> None:
-    """Name what the dead have left among the ids that a status shows running, but our own.
+    """Name the goals of dead processes among the ids that a status shows as running.
 
-    A process that is killed cancels nothing. Nor is anything canceled here: `bt-actions cleanup`
-    does that (recovery/sweep.py), when a user wants it. `told` are those that were named before.
+    A process that is killed cancels nothing. This warning cancels nothing either: `bt-actions
+    cleanup` does that (recovery/sweep.py), when a user wants it. `told` are the goals that were
+    named before.
     """
     if len(told) >= TOLD_AT_MOST:
         return

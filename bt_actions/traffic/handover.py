@@ -1,7 +1,7 @@
-"""Hands goals that were lost, or left, from one endpoint to another of the same action.
+"""The handover of goals that were lost, or left, from one endpoint to another of the same action.
 
-Each node discovers for itself. So where a goal's server has gone for one node, whichever node of
-this process sees that server again sees to the goal, and cancels it first. All under the host's
+Each node discovers for itself. So a goal whose server has gone for one node belongs to whichever
+node of this process sees that server again, and is canceled first. The caller holds the host's
 lock.
 """
 
@@ -14,15 +14,15 @@ from bt_actions.traffic.route import TOO_NEW
 from bt_actions.traffic.state import Endpoint
 
 LOST_KEPT = 100
-"""Goals of one action remembered in case their server, or their request, turns up: the newest."""
+"""Goals of one action, the newest, that are kept in case their server or their request turns up."""
 
 
 def take_over(endpoint: Endpoint, now: float) -> None:
-    """Take lost goals of other nodes whose server is in sight here: it is to cancel them first.
+    """Take lost goals of other nodes whose server is in sight here; the server cancels them first.
 
-    If it has gone for the other, or is taken there for a dead one, which is shown until its lease
-    runs out. Where both endpoints see the same, the goal stays where it is: else they would hand it
-    to each other in turn.
+    A goal moves where its server has gone for the other node, or where the other node takes a
+    living server for a dead one, which is shown until its lease runs out. Where both endpoints see
+    the same, the goal stays: otherwise the two would hand it to each other in turn.
     """
     watch = endpoint.watch
     if watch.state(now) is Server.ABSENT:
@@ -39,18 +39,18 @@ def take_over(endpoint: Endpoint, now: float) -> None:
 
 
 def adopt(endpoint: Endpoint) -> None:
-    """Take over what was lost, or left, at this action before, to cancel it first."""
+    """Take goals that were lost, or left, at this action before, to cancel them first."""
     for handle in endpoint.domain.lost.pop(endpoint.action, []):
         saw_it = endpoint.participant.seen_since + TOO_NEW < handle.begun_at.steady
         if handle.endpoint.participant is not endpoint.participant and not saw_it:
-            # A later node need only have discovered
+            # A later node only has to discover the server
             until = endpoint.host.steady() + (LEASE if handle.not_gone_before == NEVER else TOO_NEW)
             handle.not_gone_before = max(handle.not_gone_before, until)
         take_in(endpoint, handle)
 
 
 def park(endpoint: Endpoint, *, all_of_them: bool = False) -> None:
-    """Leave goals that are lost, or hold nothing any more, or all, to whoever comes next."""
+    """Leave goals that are lost, or hold nothing any more, or all, to the next endpoint."""
     for handle in endpoint.handles:
         goal = handle.goal
         if all_of_them or (goal.outcome is not None and not goal.claims_resources):
@@ -62,7 +62,7 @@ def park(endpoint: Endpoint, *, all_of_them: bool = False) -> None:
 
 
 def bound_the_lost(endpoint: Endpoint) -> None:
-    """Give up the oldest of too many lost goals; none that its server may still decide on."""
+    """Give up the oldest of too many lost goals; keep those that a server may still decide on."""
     forgettable = [handle for handle in endpoint.handles if handle.accounted_for]
     for handle in forgettable[:-LOST_KEPT]:
         tell(handle, Event.ABANDONED)

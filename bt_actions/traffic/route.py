@@ -1,8 +1,9 @@
-"""How one endpoint sees, asks and hears its server: in its node's participant, or in another.
+"""The route of one endpoint to its server: through its node's participant, or through another.
 
-Our participant may not see a server that runs (ros/rediscovery.py), or that server may not hear it
-(servers/reachability.py). Another participant is looked for then, and its transport is tried; it is
-used (`watcher.move_to`) until it is gone. Tells no goal anything. All under the host's lock.
+Our participant may not see a server that runs (ros/rediscovery.py), or that server may not hear our
+participant (servers/reachability.py). Then another participant is looked for, and its transport is
+tried; `watcher.move_to` uses that transport until it is gone. Nothing here tells a goal anything.
+The caller holds the host's lock.
 """
 
 from __future__ import annotations
@@ -17,16 +18,17 @@ from bt_actions.traffic.state import Endpoint
 from bt_actions.traffic.transport import ActionTransport, nobodys, send_probe
 
 TOO_NEW = 3.0
-"""Seconds for which a participant has dropped nobody: no lease that is useful is shorter.
+"""Seconds for which a participant has dropped no server: no useful lease is shorter.
 
-After them it has discovered who was there."""
+After them the participant has discovered every server that was there.
+"""
 DISCOVERS = 1.0
-"""Seconds that a participant, while it is new, takes to see all servers of a name: of two that had
-been up for long, the second was seen up to 0.6 s after the first, on one machine."""
+"""Seconds that a new participant takes to see all servers of a name: of two servers that had been
+up for long, the second was seen up to 0.6 s after the first, on one machine."""
 LAST_WORD = 0.5
 """Seconds within which a server that is not busy answers."""
 ON_TRIAL = 0
-"""The number of a trial's probe, of which nobody is told."""
+"""The number of a trial's probe; the answers reach no goal."""
 LOOK_WHILE_RUNNING = 0.2
 """Seconds between two looks at a server on which goals are open."""
 
@@ -35,12 +37,12 @@ LOOK_WHILE_RUNNING = 0.2
 
 
 def is_absent(endpoint: Endpoint, now: float) -> bool:
-    """Whether no server was in sight at the last look or glance."""
+    """Return whether no server was in sight at the last look or glance."""
     return endpoint.watch.state(now) is Server.ABSENT
 
 
 def glance(endpoint: Endpoint) -> None:
-    """Let the watch see who is in sight; what follows is for `watcher.look` to say."""
+    """Let the watch see the servers in sight; the consequences are for `watcher.look`."""
     with contextlib.suppress(Exception):
         if endpoint.transport.servers() != endpoint.watch.gids:
             endpoint.looked_at = NEVER
@@ -56,7 +58,7 @@ def ask_discovery(endpoint: Endpoint, now: float, *, concludes: bool = True) -> 
 
 
 def probe(endpoint: Endpoint) -> None:
-    """Ask the server just in order to be answered."""
+    """Ask the server a question whose only purpose is an answer."""
     number, now = next(endpoint.probes), endpoint.host.steady()
     endpoint.watch.probe_sent(now, nobodys(number))
     endpoint.transport.forget(nobodys(number - PROBES_KEPT))
@@ -65,7 +67,7 @@ def probe(endpoint: Endpoint) -> None:
 
 
 def deliver_arrived(endpoint: Endpoint) -> None:
-    """Take what has arrived, whether or not somebody spins; what fails in it stops nothing."""
+    """Take arrived messages, whether or not an executor spins; an error in one stops nothing."""
     if endpoint.is_parents:
         return
     try:
@@ -80,10 +82,10 @@ def deliver_arrived(endpoint: Endpoint) -> None:
 
 
 def holds_back(endpoint: Endpoint, now: float) -> bool:
-    """Whether nothing is sent though a server is in sight: it may not be heard, or be two.
+    """Return whether to send nothing though a server is in sight: it may not hear us, or be two.
 
-    Of two, a new participant may not have discovered the second yet. The first one may be the wrong
-    one, or both may move.
+    A new participant may not have discovered the second of two servers yet. The first one may be
+    the wrong one, or both robots may move.
     """
     if in_doubt(endpoint, now):
         return True
@@ -94,22 +96,22 @@ def holds_back(endpoint: Endpoint, now: float) -> bool:
 
 
 def in_doubt(endpoint: Endpoint, now: float) -> bool:
-    """Whether a server that is silent may not have heard us, and there may be another way."""
+    """Return whether a silent server may not have heard us, and another way may exist."""
     if endpoint.orphaned or is_absent(endpoint, now):
         return False
     return _reachability(endpoint, now).in_doubt(now) > 0.0
 
 
 def take_question(endpoint: Endpoint, now: float) -> bool:
-    """Whether to ask the server something now, just in order to be answered; takes the turn."""
+    """Return whether to ask the server a question for its answer alone; a True uses the turn up."""
     reachability = _reachability(endpoint, now)
     return not is_absent(endpoint, now) and reachability.take_question(now)
 
 
 def _reachability(endpoint: Endpoint, now: float) -> Reachability:
-    """Return that of the transport, which knows of all stalls by now."""
+    """Return the transport's reachability, after it was told of all stalls by now."""
     reachability, stalls = endpoint.transport.reachability, endpoint.host.stalls
-    stalls.lives(now)  # whoever asks may be the first to run again
+    stalls.lives(now)  # this call may be the first sign of life after a stall
     if stalls.long_times != endpoint.long_stalls:
         endpoint.long_stalls = stalls.long_times
         reachability.doubt(now)
@@ -120,10 +122,9 @@ def _reachability(endpoint: Endpoint, now: float) -> Reachability:
 
 
 def misses(endpoint: Endpoint) -> bool:
-    """Whether a server is wanted that may be there, though nothing shows all of it.
+    """Return whether a wanted server may be there, though it is not shown whole, or is silent.
 
-    Or it is shown, and does not answer. Not while answers may be under way: in a second, what runs
-    on an absent server is lost.
+    Goals under way come first: what runs on an absent server counts as lost within a second.
     """
     now = endpoint.host.steady()
     is_new = now - endpoint.participant.seen_since < TOO_NEW
@@ -138,10 +139,7 @@ def misses(endpoint: Endpoint) -> bool:
 
 
 def is_unresponsive(endpoint: Endpoint, now: float) -> bool:
-    """Whether a server is in sight that has not answered for long.
-
-    Not where nobody has taken its answers.
-    """
+    """Return whether a server in sight has been silent for long, with its arrived answers taken."""
     if is_absent(endpoint, now) or not endpoint.transport.reachability.is_unresponsive(now):
         return False
     deliver_arrived(endpoint)
@@ -149,7 +147,7 @@ def is_unresponsive(endpoint: Endpoint, now: float) -> bool:
 
 
 def begin_trial(endpoint: Endpoint, transport: ActionTransport) -> None:
-    """Try a transport like our own, which was opened in another participant."""
+    """Try a second transport, which was opened in another participant."""
     transport.beside_another = True
     now = endpoint.host.steady()
     if not is_absent(endpoint, now):
@@ -159,10 +157,11 @@ def begin_trial(endpoint: Endpoint, transport: ActionTransport) -> None:
 
 
 def is_better(endpoint: Endpoint, transport: ActionTransport) -> bool:
-    """Whether this one, which is ready, is heard where our own is not, or sees what that does not.
+    """Return whether the second transport is heard where our own is not, or sees more.
 
-    Asked again and again until an answer has had time to come. A server that answers nobody is
-    busy; one that has just answered this one would answer our own as well, if it heard it.
+    The caller asks again and again until an answer has had time to come. A server that answers
+    neither transport is busy. A server that has just answered the second one would answer our own
+    as well, if it heard that.
     """
     now = endpoint.host.steady()
     if is_absent(endpoint, now):
@@ -182,10 +181,10 @@ def is_better(endpoint: Endpoint, transport: ActionTransport) -> bool:
 
 
 def replace_transport(endpoint: Endpoint, transport: ActionTransport) -> None:
-    """Use another transport, of which nothing is known yet.
+    """Use another transport, with nothing known yet.
 
-    The old one stays open for the goal requests that are under way: on a link that loses them the
-    middleware sends them again, as long as their sender is there.
+    The old transport stays open for the goal requests that are under way: on a link that loses
+    requests the middleware sends them again, as long as their sender is there.
     """
     pending = [each for each in endpoint.handles if each.goal.request_pending]
     endpoint.transport.beside_another = True
@@ -198,7 +197,7 @@ def replace_transport(endpoint: Endpoint, transport: ActionTransport) -> None:
 
 
 def close_former(endpoint: Endpoint) -> None:
-    """Close the transports of before by which no goal request is under way any more."""
+    """Close the replaced transports that have no goal request under way any more."""
     for transport, sent in list(endpoint.former.items()):
         if not any(handle.goal.request_pending for handle in sent):
             del endpoint.former[transport]
@@ -206,12 +205,12 @@ def close_former(endpoint: Endpoint) -> None:
 
 
 def fall_back(endpoint: Endpoint) -> bool:
-    """Use our node's participant again, as the other is gone; return whether that is there."""
+    """Use our node's participant again, as the other is gone; return whether ours is there."""
     if not endpoint.elsewhere:
         return endpoint.participant.alive()  # the next look may see more
     try:
         transport = endpoint.participant.open_transport(*endpoint.action, endpoint)
-    except Exception:  # noqa: BLE001 - or it is gone by now, too
+    except Exception:  # noqa: BLE001 - our node is gone by now, too
         return False
     endpoint.elsewhere = False
     endpoint.transport.close()

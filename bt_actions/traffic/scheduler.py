@@ -1,8 +1,8 @@
-"""What is to be run, and when: the endpoints with open goals, ticks or not.
+"""The scheduler of endpoints with open goals: they are run when due, ticks or not.
 
-Decides when it wants to be run; whoever owns it (the alarm thread of ros/, or a loop in virtual
-time) sleeps until then. As it never sleeps for long, it notices when the whole process stood still;
-whether it did while no goal was open, nobody knows. No thread, and no clock of its own.
+The scheduler says when its owner is to run it (`wakes_at`): the alarm thread of ros/, or a loop in
+virtual time, sleeps until then. Its sleeps are short, so that a stall of the process is noticed; a
+stall while no goal was open stays unknown. No thread, and no clock of its own.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from typing import Protocol
 from bt_actions.traffic.stalls import Stalls
 
 AT_LEAST_EVERY = 0.2
-"""Seconds; a clock that is not the steady one may run faster than anybody can know."""
+"""Seconds between two runs, at most; a clock other than the steady one may run at any speed."""
 
 SHORTEST = 0.001
-"""Seconds of sleep in any case, should what is due stay due."""
+"""Seconds of sleep in any case, should a due endpoint stay due."""
 
 
 class Scheduled(Protocol):
-    """What is run when it is due: an endpoint, or a watchdog."""
+    """An endpoint, or a watchdog, that is run when due."""
 
     def run_due(self, now: float) -> float:
-        """Do what is due and return the seconds until there is more."""
+        """Do what is due and return the seconds until more is due."""
 
 
 class Scheduler:
@@ -37,44 +37,44 @@ class Scheduler:
         wake: Callable[[], None],
         failed: Callable[[Scheduled, Exception], None],
     ) -> None:
-        """`wake` is called when `run` is wanted earlier than it has said, or again after a rest.
+        """Make a scheduler; `wake` is called when `run` is wanted early, or again after a rest.
 
-        `failed` is told what an endpoint raised, which keeps no other from its turn.
+        `failed` gets the error of an endpoint, which keeps no other endpoint from its turn.
         """
         self._steady, self._stalls = steady, stalls
         self._wake, self._failed = wake, failed
         self._open: dict[Scheduled, None] = {}  # in the order in which they came
         self.wakes_at = 0.0
-        """When it wants to be run again (seconds, steady clock)."""
+        """The moment of the next run (seconds, steady clock)."""
 
     def add(self, endpoint: Scheduled) -> None:
-        """Run this one until it is removed."""
+        """Run this endpoint until it is removed."""
         if not self._open:
             self._wake()
         self._open[endpoint] = None
 
     def remove(self, endpoint: Scheduled) -> None:
-        """Run it no more."""
+        """Run this endpoint no more."""
         self._open.pop(endpoint, None)
 
     def clear(self) -> None:
-        """Run nothing."""
+        """Remove all endpoints."""
         self._open.clear()
 
     @property
     def scheduled(self) -> list[Scheduled]:
-        """Return the endpoints with open goals."""
+        """The endpoints with open goals."""
         return list(self._open)
 
     def wake_by(self, moment: float) -> None:
-        """See to it that it is run by `moment` (steady clock)."""
+        """Have the next run come by `moment` (steady clock)."""
         if moment < self.wakes_at:
             self.wakes_at = moment
             self._wake()
 
     def run(self) -> None:
-        """Run all, and say when to do so again (`wakes_at`)."""
-        wait, self.wakes_at = AT_LEAST_EVERY, math.inf  # who asks meanwhile is heard
+        """Run all endpoints, and set the moment of the next run (`wakes_at`)."""
+        wait, self.wakes_at = AT_LEAST_EVERY, math.inf  # a `wake_by` meanwhile counts
         for endpoint in self.scheduled:
             self._stalls.lives(self._steady())  # each look takes its time
             try:

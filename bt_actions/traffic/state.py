@@ -1,9 +1,9 @@
-"""What there is: a process, its ROS domains, their endpoints, and the goals on their way.
+"""The data of this room: a process, its ROS domains, their endpoints, and the goals on their way.
 
-Each belongs to the one before it, and knows it. They are values and registers, and decide nothing;
-what is done with them stands in the other files of this folder. `Host` is a part of the seam: one a
-process with rclpy (ros/host.py), or one a simulated run (testing/host.py). All that goals share
-beyond their endpoints hangs on it, so that nothing hangs on a module.
+Each belongs to the one before it, and knows it. These are values and registers, which decide
+nothing; the other files of this folder act on them. `Host` is a part of the seam: one a process
+with rclpy (ros/host.py), or one a simulated run (testing/host.py). All that goals share beyond
+their endpoints hangs on the host, and nothing hangs on a module.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _LONG_AGO = Now(NEVER, NEVER)
 
 
 class Log(Protocol):
-    """Takes lines from any thread, and never waits."""
+    """A log that takes lines from any thread, and never waits."""
 
     def info(self, text: str) -> None:
         """Log at info level."""
@@ -49,36 +49,38 @@ class Log(Protocol):
         """Log at error level."""
 
     def flush(self) -> None:
-        """Have what was said written, before more is told by other ways; waits a moment at most."""
+        """Have the lines written before more is told by other ways; waits a moment at most."""
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What is on record of a goal."""
+    """The facts on record of one goal."""
 
     action: str
     domain: int
     """ROS domain id."""
     servers: frozenset[bytes]
-    """GIDs of the servers that were in sight; none where they are not known."""
+    """GIDs of the servers that were in sight; empty where they are not known."""
     accept: float = 0.0
-    """Seconds that its server is given to decide; 0: nobody said."""
+    """Seconds that the server is given to decide; 0 where the sender set no limit."""
     lost: bool = False
-    """They have gone, as far as is known; but they may only stand still."""
+    """Whether the servers have gone, as far as is known; a server may also stand still."""
 
 
 class Record:
-    """What was sent and is not answered yet, should the process be killed; this one keeps nothing.
+    """The record of requests without an answer, should the process be killed.
 
-    recovery/ledger.py has one that does.
+    This one keeps nothing.
+
+    The record of recovery/ledger.py keeps them in a file.
     """
 
     def __contains__(self, goal_id: bytes) -> bool:
-        """Whether a goal is on record."""
+        """Return whether a goal is on record."""
         return False
 
     def enter(self, goal_id: bytes, entry: Entry) -> None:
-        """Put a goal on record that is about to be sent, or what more is known of it."""
+        """Put a goal on record before its request is sent, or update its facts on record."""
 
     def strike(self, goal_id: bytes) -> None:
         """Take a goal off the record, if it is there."""
@@ -87,92 +89,94 @@ class Record:
         """Take note that the process ends."""
 
     def disown(self) -> None:
-        """Let go of it, as the child of a fork: it is the parent's."""
+        """Let go of the record in the child of a fork: the record is the parent's."""
 
 
 class Trace:
-    """Is told of every step of every goal, under the lock; this one takes no note."""
+    """A witness of every step of every goal, under the lock; this one takes no note."""
 
     def tells(self, handle: GoalHandle, event: Event) -> None:
-        """A goal is about to be told what happened."""
+        """Take note that a goal is about to be told an event."""
 
     def told(
         self, handle: GoalHandle, event: Event, detail: Any, commands: tuple[Command, ...]
     ) -> None:
-        """A goal was told what happened, and returned these commands."""
+        """Take note that a goal was told an event, and returned these commands."""
 
     def shows_time(self, handle: GoalHandle) -> None:
-        """A goal is about to be shown the time."""
+        """Take note that a goal is about to be shown the time."""
 
 
 class Host(Protocol):
-    """What the goals of a process, or of one simulated run, have in common."""
+    """The common ground of all goals of a process, or of one simulated run."""
 
     @property
     def lock(self) -> AbstractContextManager[Any]:
-        """The one lock; whoever holds it may take it again. Nothing waits under it."""
+        """The one lock, which its holder may take again. Nothing waits under it."""
 
     @property
     def log(self) -> Log:
-        """Where lines go."""
+        """The log of this process."""
 
     record: Record
-    """Where a goal is put before it is sent."""
+    """The record of goals that are about to be sent."""
 
     stalls: Stalls
-    """When this process stood still, and what it may not conclude yet."""
+    """The stalls of this process, and the graces after them."""
 
     scheduler: Scheduler
     """The endpoints with open goals."""
 
     trace: Trace
-    """Who watches the goals' steps."""
+    """The witness of the goals' steps."""
 
     forks: int
-    """Forks between the first process and this one: what an older one made is not ours."""
+    """The number of forks between the first process and this one: objects from before belong to a
+    parent."""
 
     closing: bool
     """Whether the process ends: a tree that ticks on begins nothing any more."""
 
     def domain(self, number: int) -> Domain:
-        """Return what is shared in the ROS domain of this number."""
+        """Return the common data of the ROS domain of this number."""
 
     def wait(self, timeout: float) -> bool:
         """Wait for a change of any goal, at most so many seconds; the caller holds the lock."""
 
     def notify_all(self) -> None:
-        """Wake whoever waits, as a goal has changed; the caller holds the lock."""
+        """Wake all that `wait`, as a goal has changed; the caller holds the lock."""
 
     def steady(self) -> float:
-        """Return seconds that only ever go forward."""
+        """Return the steady clock, in seconds that only ever grow."""
 
     def wall(self) -> float:
-        """Return seconds since 1970 on the computer's clock."""
+        """Return the computer's clock, in seconds since 1970."""
 
     def new_goal_id(self) -> bytes:
         """Return 16 bytes that no goal has had."""
 
 
 class Domain:
-    """What all nodes of this process in one ROS domain share."""
+    """The data that all nodes of this process in one ROS domain share."""
 
     def __init__(self) -> None:
         self.resources: Resources[GoalHandle] = Resources()
         self.effects: deque[tuple[Callable[[GoalHandle], None], GoalHandle]] = deque()
-        """What goals have decided is to be done, in that order."""
+        """The effects of goals' decisions that are still to be done, in order."""
         self.does_effects = False
         self.open: dict[Endpoint, None] = {}
-        """The endpoints with goals, of all nodes, in the order in which they came."""
+        """The endpoints with goals, of all nodes, in order of arrival."""
         self.unsent: dict[GoalHandle, None] = {}
-        """Goals that are to be sent, and some that were since (driver.py drops them)."""
+        """Goals that are to be sent, and some that were sent since (driver.py drops these)."""
         self.left: dict[GoalHandle, None] = {}
         """Goals of these endpoints that hold no resources any more."""
         self.ever_lost_sight = False
-        """A server went out of sight once: what else its process serves may have, too."""
+        """Whether a server once went out of sight: other servers of its process may have gone with
+        it."""
         self.known: set[Action] = set()
         """The actions that had a server once."""
         self.lost: dict[Action, list[GoalHandle]] = defaultdict(list)
-        """Lost goals whose endpoint is gone: their server may be back for the next one."""
+        """Lost goals without an endpoint: the next endpoint may see their server again."""
         self.cancels: dict[Action, CancelQueue] = defaultdict(CancelQueue)
 
 
@@ -181,13 +185,13 @@ class CancelQueue:
     """The cancel requests of this process to one server (cancel_queue.py)."""
 
     waiting: dict[bytes, Endpoint] = field(default_factory=dict)
-    """Whom there is no room for yet, and which endpoint is to ask."""
+    """The goals whose cancel request waits for room, each with the endpoint that is to send it."""
     asked: dict[bytes, float] = field(default_factory=dict)
-    """When those were asked for that have no answer since."""
+    """The cancel requests without an answer, each with the moment of the request."""
 
 
 class Participant(Protocol):
-    """A participant of the ROS network: what it sees and hears, the goals of its node do."""
+    """A participant of the ROS network; its sight is that of the goals of its node."""
 
     domain: int
     """The ROS domain id."""
@@ -199,29 +203,31 @@ class Participant(Protocol):
     """The namespace of the node: "/" or "/r1"."""
 
     seen_since: float
-    """Since when it sees others (seconds, steady clock).
+    """The moment from which on it sees others (seconds, steady clock).
 
-    A new one has dropped no server yet: what it does not see it may still discover.
+    A new participant has dropped no server yet: a server out of its sight may still be discovered.
     """
 
     long_stalls: int
-    """How often the process had stood still for long by `seen_since` (Stalls.long_times)."""
+    """The value of Stalls.long_times at `seen_since`."""
 
     def now(self) -> Now:
-        """Return this moment, by the steady clock and by its own."""
+        """Return this moment, by the steady clock and by the node's own."""
 
     def alive(self) -> bool:
-        """Whether it is there, and can send and hear."""
+        """Return whether the participant is there, and can send and hear."""
 
     def shut_down(self) -> bool:
-        """Whether all of ROS was shut down here, as by Ctrl-C; else one that is not alive has gone
-        from under its goals."""
+        """Return whether all of ROS was shut down here, as by Ctrl-C.
+
+        A participant that is not alive for another reason was destroyed under its goals.
+        """
 
     def full_name(self, action: str) -> str:
-        """Return the full name of an action; raises ValueError for one that ROS refuses."""
+        """Return the full name of an action; raises ValueError for a name that ROS refuses."""
 
     def open_transport(self, action_type: Any, name: str, listener: Listener) -> ActionTransport:
-        """Open one; raises what the middleware raises for a wrong name or type."""
+        """Open a transport; raises what the middleware raises for a wrong name or type."""
 
     def instead(self, action_type: Any, name: str) -> str:
         """Say, as the end of a sentence, what is in sight where this action is not; or ""."""
@@ -230,17 +236,17 @@ class Participant(Protocol):
         """Say, as the end of a sentence, what may keep a server in sight from answering; or ""."""
 
     def seek(self, endpoint: Endpoint) -> None:
-        """Have another participant look for its server, soon, as long as `route.misses` it.
+        """Have another participant look for the endpoint's server, as long as `route.misses` it.
 
-        Does nothing where there can be no other, or where it would find another server than ours.
+        Does nothing where no other participant can exist, or where it would find another server.
         """
 
 
 class Endpoint(Listener, Scheduled):
     """One action as one node sees it: the shared transport, and the goals on it.
 
-    Each is an ActionEndpoint (endpoint.py), which has what the world calls: the methods of these
-    two protocols.
+    Each is an ActionEndpoint (endpoint.py), which has the methods of both protocols, for the world
+    to call.
     """
 
     def __init__(
@@ -250,55 +256,60 @@ class Endpoint(Listener, Scheduled):
         self.host, self.participant = host, participant
         self.domain = host.domain(participant.domain)
         self.of_node = of_node
-        """The endpoints of its node, by name: it takes itself out when it is not used any more."""
+        """The endpoints of its node, by name: an unused endpoint takes itself out."""
         self.action, self.name = action, action[1]
         self.users = 0
-        """How many leaves are set up for it."""
+        """The number of leaves that are set up for it."""
         self.goals: dict[bytes, GoalHandle] = {}
         self.ended: dict[bytes, Ended] = {}
         """The newest goals that were DONE here."""
         self.cancels = self.domain.cancels[action]
         self.forks = host.forks
-        """How many forks there had been when it was made."""
+        """The number of forks when it was made."""
 
         # Its server (watcher.py)
         self.watch = ServerWatch()
         self.heard_at = host.steady()
-        """When a server of its goals was last heard; a denial by a newcomer does not count."""
+        """The last moment at which a server of its goals was heard; a denial by a newcomer does not
+        count."""
         self.orphaned = False
-        """Its node is gone: nobody can want its goals any more."""
+        """Whether its node is gone: nobody can want its goals any more."""
         self.look_at = 0.0
-        """When to look at the server again."""
+        """The moment of the next look at the server."""
         self.looked_at, self.looked_like = NEVER, Server.ABSENT
-        """When that was last done and told to the goals, and what was found."""
+        """The last look that was told to the goals: its moment, and the server's state."""
         self.counted = 0
-        """How many servers were shown then."""
+        """The number of servers shown then."""
         self.held_back = (True, True)
-        """Why nothing was sent then, though a server was in sight: it had just come, as it has in
-        the beginning; `route.holds_back`."""
+        """Why nothing was sent at that look though a server was in sight: the server had just come
+        (as at the beginning); `route.holds_back`."""
         self.left_by_dead: set[bytes] = set()
-        """Goals of dead processes that were named."""
+        """Goals of dead processes that the log has named."""
         self.probes = itertools.count(PROBES_KEPT)
 
         # The way to it (route.py)
         self.elsewhere = False
-        """The transport is not in our node's participant: nobody spins it."""
+        """Whether the transport is in another participant than our node's: nobody spins that one.
+        """
         self.long_stalls = participant.long_stalls
         self.compared_at = NEVER
-        """When a server was asked that has answered a transport on trial."""
+        """The moment of the question to a server that has answered a transport on trial."""
         self._warned_of: set[str] = set()
         self.transport = participant.open_transport(*action, self)
         self.former: dict[ActionTransport, list[GoalHandle]] = {}
-        """Transports that were replaced, and the goals whose request was under way there."""
+        """Replaced transports, each with the goals whose request was under way there."""
 
     @property
     def is_parents(self) -> bool:
-        """Whether this was made before a fork, and we are the child: the goals are not ours."""
+        """Whether the endpoint is from before a fork, and this process is the child.
+
+        Its goals are not ours.
+        """
         return self.forks != self.host.forks
 
     @property
     def handles(self) -> list[GoalHandle]:
-        """Those of the goals that are here now."""
+        """The goals that are here now."""
         return list(self.goals.values())
 
     @property
@@ -311,7 +322,7 @@ class Endpoint(Listener, Scheduled):
         self.look_at = 0.0
 
     def warn_once(self, what: str, error: Exception) -> None:
-        """Log, the first time, what could not be done, which is tried again later."""
+        """Log a failure the first time; the action that failed is tried again later."""
         if what not in self._warned_of:
             self._warned_of.add(what)
             self.host.log.error(f"{self.name}: {what}: {raised(error)}")
@@ -319,37 +330,38 @@ class Endpoint(Listener, Scheduled):
 
 @dataclass(eq=False, slots=True)
 class GoalHandle:
-    """A goal on its way, with what its owner and its server need to know."""
+    """A goal on its way, with the facts that its owner and its server need."""
 
     goal: Goal
     endpoint: Endpoint
-    """Where it is sent; the endpoint that sees a lost goal's server again takes it over."""
+    """The endpoint that sends the goal; the one that sees a lost goal's server again takes it over.
+    """
     owner: Any
-    """The leaf; None where it is gone, and a second server has taken its goal, too."""
+    """The leaf; None where the leaf is gone, and a second server has taken its goal, too."""
     name: str
-    """The leaf's."""
+    """The name of the leaf."""
     run: RunListener | None = None
-    """Which run it belongs to: the last one that ticked its leaf; None where nobody said it."""
+    """The run that ticked the leaf last; None in a loop of the user's."""
     attempt: int = 1
     keeps_feedback: bool = False
     begun_at: Now = _LONG_AGO
-    """When it was wished for; long ago where nobody knows."""
+    """The moment at which the leaf began the goal; long ago where that is unknown."""
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
     replies: Replies = field(init=False)
     end_logged: End | None = None
-    """The end that the log knows of: it says where that is UNKNOWN, and is not any more."""
+    """The end that the log knows: it tells an UNKNOWN end, and when that becomes known."""
     paused: bool = False
-    """Its tree is, and it was not sent."""
+    """Whether the tree is paused, and the goal is not sent."""
     held_back_since: float | None = None
-    """Since when (steady clock) its deadlines stand still, as it is paused, or not sent though a
-    server is in sight (route.holds_back)."""
+    """The moment (steady clock) from which on the deadlines stand still: the goal is paused, or is
+    not sent though a server is in sight (route.holds_back)."""
     not_gone_before: float = NEVER
-    """Until when (steady clock) its server does not count as gone where it is not shown. It may be
-    stopped, and is shown again within LEASE, or not be discovered by a new node, which takes
-    TOO_NEW (handover.adopt, watcher.move_to)."""
+    """The moment (steady clock) until which a server out of sight does not count as gone. The
+    server may be stopped, and is shown again within LEASE. A new node may not have discovered it,
+    which takes TOO_NEW (handover.adopt, watcher.move_to)."""
 
     standing: Standing = field(init=False)
-    """How the goal stood after its last step."""
+    """The standing of the goal after its last step."""
 
     def __post_init__(self) -> None:
         self.replies = Replies(self.goal)
@@ -357,9 +369,9 @@ class GoalHandle:
 
     @property
     def is_decided(self) -> bool:
-        """Whether its outcome is decided, and its end and result are set as they are known then.
+        """Whether the outcome is decided, with the end and the result that are known by then.
 
-        Asked without the lock: the step that decided it is over.
+        Readable without the lock: the step of the decision is over.
         """
         return self.standing.shown[1] is not None
 
@@ -375,31 +387,32 @@ class GoalHandle:
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing is left to wait for: nor a server that may only have stood still."""
+        """Whether nothing is left to wait for, not even a server that may only stand still."""
         return self.accounted_for and not self.looked_out_for
 
     @property
     def looked_out_for(self) -> bool:
-        """Whether a server is looked out for that went away with it, and has not told its end."""
+        """Whether the return of a server that went away with the goal is awaited."""
         return self.goal.lost and Event.LOOK_OUT_DUE in self.goal.deadlines
 
 
 class Standing(NamedTuple):
-    """What of a goal matters for what follows from a step."""
+    """The part of a goal's state from which the effects of a step follow."""
 
     state: State
     shown: tuple[str, Outcome | None, End]
     in_the_way: tuple[bool, ...]
-    """What others may wait for: room at its server, or its end."""
+    """The facts that other goals may wait for: room at the server, or this goal's end."""
     off_record: bool
-    """Whether it need not be on record any more: whoever got it shows it, or will not run it.
+    """Whether the goal need not be on record: its server shows the goal, or will not run it.
 
-    One that two servers got is accepted by one of them first. And a server that has gone may only
-    stand still, for longer than this process is there."""
+    Of two servers with the request, one accepts first, and the other may not have decided. A server
+    that has gone may only stand still, for longer than this process lives.
+    """
 
     @classmethod
     def of(cls, handle: GoalHandle) -> Standing:
-        """Return it as it is now."""
+        """Return the present standing of a goal."""
         goal = handle.goal
         pending = goal.in_flight, goal.request_pending
         in_the_way = *pending, goal.outstanding, goal.lost, goal.claims_resources
@@ -412,24 +425,23 @@ class Standing(NamedTuple):
 
 @dataclass(eq=False)
 class RunListener:
-    """Who runs a tree, as its goals know it, which outlive both."""
+    """A run of a tree as its goals know it; the listener outlives both."""
 
     notify: Callable[[GoalHandle | None], None]
-    """Takes note, on any thread and under the lock, of a goal of its that has a new state, outcome
-    or end; of None: there is reason to tick."""
+    """The call for a goal with a new state, outcome or end, on any thread and under the lock; None
+    as the goal: the tree has reason to tick."""
     feedback: Callable[[GoalHandle, Any], None] = lambda handle, message: None
-    """Takes note, likewise, of feedback of a goal of its."""
+    """The call for feedback of one of its goals, likewise."""
     sight: Callable[[str, bool], None] = lambda server, in_sight: None
-    """Takes note, likewise, that the server of one of its goals has come in sight, or gone."""
+    """The call for a server of one of its goals that comes in sight, or goes, likewise."""
 
 
 ticking_run: ContextVar[RunListener | None] = ContextVar("ticking_run", default=None)
-"""Which run sets up, or ticks, a tree on this thread; None where nobody has said it, as in a loop
-of the user's."""
+"""The run that sets up or ticks a tree on this thread; None in a loop of the user's."""
 
 
 def waker() -> Callable[[], None]:
-    """Return what has the run of this thread tick soon; that may be called on any thread."""
+    """Return a function for any thread, which has the run of this thread tick soon."""
     run = ticking_run.get()
     return (lambda: None) if run is None else (lambda: run.notify(None))
 
@@ -443,7 +455,7 @@ def wake(handles: Iterable[GoalHandle]) -> None:
 
 @dataclass(slots=True)
 class Ended:
-    """What is kept of a goal that is DONE; not the goal itself, which has its result."""
+    """The facts kept of a DONE goal; the goal itself, with its result, is dropped."""
 
     timeouts: Timeouts
     resources: frozenset[str]
@@ -454,7 +466,7 @@ class Ended:
     attempt: int
     accepted: bool
     servers: frozenset[GID]
-    """Who may have had it."""
+    """The servers that may have had the goal."""
     since: float
     asked_at: float = NEVER
-    """When it was last asked to be canceled all the same."""
+    """The last moment at which a server was asked to cancel the goal all the same."""

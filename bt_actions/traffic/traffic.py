@@ -1,12 +1,12 @@
-"""What leaves ask of the goals of one node: to begin, send and interrupt them, and close it all.
+"""The goals of one node, as leaves use them: begin, send and interrupt a goal, and close it all.
 
-A leaf begins a goal here and advances it at its ticks. From the moment the request is out, the
-goal is driven by what arrives, whether or not anybody ticks: answers, deadlines and the watch over
-the servers (scheduler.py). What a leaf leaves behind is thereby drained without it.
+A leaf begins a goal here and advances the goal at its ticks. Once the request is out, answers,
+deadlines and the watch over the servers (scheduler.py) drive the goal, whether or not the leaf is
+ticked. A goal that its leaf leaves behind is thereby drained without the leaf.
 
-One lock guards all of it. Under the lock nothing waits, and of the user's code only what says so:
-`ActionBehaviour.settles`. This file decides nothing about a goal (goals/goal.py), its tries
-(goals/attempts.py), or whether it may be sent (admission.py).
+One lock guards all of it. Nothing waits under the lock, and no code of the user's runs under it but
+`ActionBehaviour.settles`, which says so. This file decides nothing about a goal (goals/goal.py),
+its attempts (goals/attempts.py), or about sending (admission.py).
 """
 
 from __future__ import annotations
@@ -34,15 +34,16 @@ class Traffic:
     def __init__(self, host: Host, participant: Participant) -> None:
         self.host, self.participant = host, participant
         self.closed = False
-        """Whether it was destroyed; whoever sets up a tree needs another one."""
+        """Whether it was destroyed; the next tree needs another one."""
         self._domain = host.domain(participant.domain)
         self._endpoints: dict[str, Endpoint] = {}
 
     def endpoint(self, action_type: Any, action_name: str) -> Endpoint:
         """Return the shared endpoint to an action, and count its user.
 
-        A remapping rule for the action's name has no effect, and is warned of. Raises ValueError
-        for a name that ROS refuses, and TwoTypes when it is in use with another type.
+        A remapping rule for the action's name has no effect, and a warning says so. Raises
+        ValueError for a name that ROS refuses, and TwoTypes where the name is in use with another
+        type.
         """
         name = self.participant.full_name(action_name)
         with self.host.lock:
@@ -64,7 +65,7 @@ class Traffic:
         return endpoint
 
     def leave(self, endpoint: Endpoint) -> None:
-        """Count a user of `endpoint` off; with the last one, and no goal open, it goes."""
+        """Count off a user of `endpoint`; without users and open goals the endpoint is closed."""
         with self.host.lock:
             endpoint.users -= 1
             if endpoint.users <= 0:
@@ -85,11 +86,11 @@ class Traffic:
         keeps_feedback: bool = False,
         accounts_for_all: Callable[[Any], bool] = lambda result: True,
     ) -> GoalHandle:
-        """Begin a goal: it queues for its resources. It is sent by `advance`.
+        """Begin a goal, which queues for its resources; `advance` sends it.
 
-        A resource is named as an action is: what is relative is in the node's namespace.
-        `accounts_for_all` is asked with the result, under the lock: where it says no, the goal's
-        end is UNKNOWN.
+        A resource is named as an action is: a relative name is in the node's namespace.
+        `accounts_for_all` gets the result, under the lock; where it returns False, the goal's end
+        is UNKNOWN.
         """
         with self.host.lock:
             now = self.participant.now()
@@ -126,10 +127,10 @@ class Traffic:
     ) -> None:
         """Take a goal as far as it goes now: send it, where its server is ready. Never waits.
 
-        It belongs from now on to the run that ticks its leaf. `make_message` is called on the
-        caller's thread, at most once a call; what it raises makes the goal INVALID_GOAL. It is
-        called without the lock (the server may go meanwhile), unless `is_plain` says that it runs
-        no code of the user's.
+        From now on the goal belongs to the run that ticks its leaf. `make_message` is called on the
+        caller's thread, at most once a call; an error in it makes the goal INVALID_GOAL. The call
+        is made without the lock (the server may go meanwhile), unless `is_plain` says that
+        `make_message` runs no code of the user's.
         """
         endpoint, handle.run = handle.endpoint, ticking_run.get() or handle.run
         if handle.goal.state is State.DONE:
@@ -150,7 +151,7 @@ class Traffic:
                     tell(handle, Event.SERVER_READY)
 
     def _is_due(self, handle: GoalHandle) -> bool:
-        """Apply what is due, look at the server, and say whether to send the goal now."""
+        """Apply due deadlines, look at the server, and return whether to send the goal now."""
         endpoint = handle.endpoint
         with self.host.lock:
             apply_deadlines(handle)
@@ -163,7 +164,7 @@ class Traffic:
             return self._may_send(handle)
 
     def _may_send(self, handle: GoalHandle) -> bool:
-        """Whether to send it now. If nothing else speaks against it, see to lost goals first."""
+        """Return whether to send the goal now; lost goals that stand in its way come first."""
         now = self.host.steady()
         if self.host.closing or not admission.finds_server(handle, now):
             return False
@@ -172,9 +173,9 @@ class Traffic:
         return admission.is_clear(handle, now)
 
     def _cancel_what_is_back(self, handle: GoalHandle, now: float) -> None:
-        """Observe each server at which goals were lost that this one might run beside.
+        """Look at each server with lost goals that this goal might run beside; cancel what is back.
 
-        Should it be back, they are canceled. Opens an endpoint where this node has none.
+        Opens an endpoint where this node has none.
         """
         left = admission.left_near(handle)
         to_see = dict.fromkeys(each.endpoint for each in left if each.goal.lost)
@@ -182,17 +183,17 @@ class Traffic:
         for action, lost in list(self._domain.lost.items()):
             if any(each.goal.resources & handle.goal.exclusive for each in lost):
                 actions[action] = None
-                if action[1] not in self._endpoints:  # a server that nobody speaks to any more
+                if action[1] not in self._endpoints:  # no leaf uses that server any more
                     self._open_to(action)
         for action in actions:
             ours = self._endpoints.get(action[1])
             if ours is not None and ours.action == action:
                 to_see[ours] = None
-        for endpoint in to_see:  # all of them first: one may see what another has lost
+        for endpoint in to_see:  # all first: one may see the server that another has lost
             watcher.look(endpoint, now)
 
     def deadline(self, handle: GoalHandle, now: Now) -> tuple[Event, float] | None:
-        """Its next deadline, and the seconds until then; these change with what arrives."""
+        """Return the goal's next deadline, and the seconds until then; arrivals change both."""
         with self.host.lock:
             return handle.goal.deadline(now)
 
@@ -203,7 +204,7 @@ class Traffic:
         return next((max(s, 1e-3) for s, event in left if event is Event.RESULT_DUE), None)
 
     def interrupt(self, handle: GoalHandle) -> None:
-        """The tree no longer wants it. Returns at once; the goal is drained."""
+        """Tell the goal that the tree no longer wants it, and return at once; a drain follows."""
         tell(handle, Event.INTERRUPTED)
 
     def pause(self, handles: Iterable[GoalHandle], wanted: bool) -> None:
@@ -214,7 +215,7 @@ class Traffic:
                 apply_deadlines(handle)
 
     def destroy(self, hurry: Callable[[], bool] = lambda: False) -> None:
-        """Drain what is still open and close the transports; nobody may spin the node any more."""
+        """Drain all open goals and close the transports; nobody may spin the node any more."""
         with self.host.lock:
             left = [each for endpoint in self._endpoints.values() for each in endpoint.handles]
         drain(self.host, left, hurry)

@@ -1,7 +1,22 @@
-"""Watches over the server of one endpoint: looks at discovery, asks, and tells the goals.
+"""The watcher over the server of one endpoint: it looks at discovery, asks, and tells the goals.
 
-Decides when to look. Who is alive is for servers/presence.py to say, and what follows for a goal
-for servers/replies.py. All under the host's lock.
+The problem: a goal has to learn that its server has come, gone, or been replaced, though ROS sends
+no such event, and a look at the graph is slow. Discovery is also wrong in both directions: a dead
+server is shown until its lease runs out, and a living one may be out of sight after a stall of this
+process.
+
+The rule: the watcher decides when to look, and nothing else. It looks every 50 ms while a goal
+waits for the server or several servers are shown, every 200 ms while goals run, and once a second
+at a server that is alone and ready, as long as the cheap count of servers stays the same. At each
+look presence.py says who lives, replies.py says what that means for each goal, and only a change is
+told. Arrived answers are taken before a goal is told that its server has gone, because they may be
+the server's last words.
+
+Why that is enough: a goal is sent only after a look that is a second old at most, and right after
+the send the servers are counted anew, so a server that came in between is known to have the
+request. A grace after a stall (stalls.py) keeps the watcher from taking silence for death.
+
+The caller holds the host's lock.
 """
 
 from __future__ import annotations
@@ -17,16 +32,18 @@ from bt_actions.traffic.state import Endpoint, wake
 from bt_actions.traffic.transport import ActionTransport
 
 LOOK_WHILE_WAITING = 0.05
-"""Seconds between two looks at a server that a goal waits for; for others, LOOK_WHILE_RUNNING."""
+"""Seconds between two looks at a server that a goal waits for; otherwise LOOK_WHILE_RUNNING."""
 LOOK_AT_REST = 1.0
-"""The same for a server that is ready and alone, as long as the count of servers stays the same."""
+"""Seconds between two looks at a server that is ready and alone, while the count of servers stays
+the same."""
 SILENT_FOR = 40.0
-"""Seconds without a word of their server until goals whose node is gone are left to whoever can see
-whether it is there: longer than a dead one is shown, or a question is kept (DENIED_FOR_GOOD)."""
+"""Seconds of silence of a server until an endpoint without a node leaves its goals to another one
+that can look for the server: longer than a dead server is shown, or a question is kept
+(DENIED_FOR_GOOD)."""
 
 
 def look_if_due(endpoint: Endpoint, now: float) -> float:
-    """Look, if it is time to; return the seconds until the next look."""
+    """Look, if a look is due; return the seconds until the next one."""
     if now >= endpoint.look_at:
         if _rests(endpoint):
             recent_state(endpoint, now)
@@ -39,19 +56,19 @@ def look_if_due(endpoint: Endpoint, now: float) -> float:
 
 
 def _is_alone(endpoint: Endpoint) -> bool:
-    """Whether the last look found one server, and it was ready."""
+    """Return whether the last look found one server, and it was ready."""
     return endpoint.looked_like is Server.READY and not endpoint.watch.is_crowded
 
 
 def _rests(endpoint: Endpoint) -> bool:
-    """Whether the server is alone, and no goal is held back from it."""
+    """Return whether the server is alone, and no goal is held back from it."""
     return _is_alone(endpoint) and not any(endpoint.held_back)
 
 
 def recent_state(endpoint: Endpoint, now: float) -> Server:
-    """Return the server's state; look, unless that was done lately and the count is as then.
+    """Return the server's state; look, unless the last look is recent and the count is the same.
 
-    A server that has taken another's place since is seen right after a send.
+    A server that has taken another's place since then is seen right after the send.
     """
     is_known = now - endpoint.looked_at < LOOK_AT_REST and _is_alone(endpoint)
     is_known &= endpoint.action not in endpoint.domain.lost  # what was left is canceled first
@@ -65,8 +82,8 @@ def recent_state(endpoint: Endpoint, now: float) -> Server:
 def look_early(endpoint: Endpoint, now: float) -> float:
     """Look for a server that no goal wants yet; return the seconds until the next look.
 
-    A first goal is held from the first sight of its server on. So the hold is one for all servers
-    of a tree, and runs while the rest of it is set up.
+    A first goal is held back from the first sight of its server on. An early look makes that one
+    hold for all servers of a tree, which runs while the rest of the tree is set up.
     """
     scheduler, transport = endpoint.host.scheduler, endpoint.transport
     is_new = now - transport.seen_since < route.TOO_NEW and not transport.closed
@@ -81,7 +98,7 @@ def look_early(endpoint: Endpoint, now: float) -> float:
 
 
 def _counts_others(endpoint: Endpoint) -> bool:
-    """Whether a server has come or gone since the last look, or our node was destroyed."""
+    """Return whether a server has come or gone since the last look, or our node was destroyed."""
     try:
         return endpoint.transport.count() != endpoint.counted
     except Exception:  # noqa: BLE001 - the middleware's: any
@@ -98,10 +115,10 @@ def look(endpoint: Endpoint, now: float) -> Server:
         if host.stalls.answers_take(now):
             watch.stood_still(now)
         route.deliver_arrived(endpoint)
-    if endpoint.transport.closed:  # by what came, and nobody used the endpoint
+    if endpoint.transport.closed:  # a delivery ended the last goal of an unused endpoint
         return Server.ABSENT
     if not alive:
-        if watch.is_crowded:  # of those shown when the node went, asking tells who lives
+        if watch.is_crowded:  # probes tell which of the last shown servers live
             watch.see(now, True, watch.gids)
             _tell_goals(endpoint, now)
         return Server.ABSENT
@@ -119,7 +136,7 @@ def look(endpoint: Endpoint, now: float) -> Server:
     endpoint.looked_at = now
     held_back = (now - watch.in_sight_since < BESIDE, route.holds_back(endpoint, now))
     if (state, held_back) != (before, endpoint.held_back):
-        wake(endpoint.handles)  # what waits for it, or was held back, may be sent
+        wake(endpoint.handles)  # goals that waited, or were held back, may be sent
     endpoint.held_back = held_back
     if state is not before:
         endpoint.domain.ever_lost_sight |= state is Server.ABSENT
@@ -147,20 +164,23 @@ def _tell_goals(endpoint: Endpoint, now: float) -> None:
     for handle in endpoint.handles:
         gone = watch.gone(now, handle.replies.sent_to)
         if not gone:
-            handle.not_gone_before = NEVER  # it has been discovered
+            handle.not_gone_before = NEVER  # the server has been discovered
         if gone and now < handle.not_gone_before:
-            continue  # it has not been discovered yet, though its status may have come already
+            continue  # the server is not discovered yet, though its status may have come
         in_sight = handle.replies.sent_to <= watch.gids and not gone
         if not in_sight and endpoint.host.stalls.servers_take(now) > 0.0:
-            continue  # as this process stood still
+            continue  # the process stood still
         if handle.goal.sent:
             if gone and not handle.goal.lost:
-                route.deliver_arrived(endpoint)  # its last words
+                route.deliver_arrived(endpoint)  # the server's last words
             tell_believed(handle, handle.replies.weigh_sight(watch, now))
 
 
 def _orphan(endpoint: Endpoint) -> None:
-    """Our node is gone, or its context: nobody can want these goals any more."""
+    """Interrupt the goals of a node that is gone, or whose context is.
+
+    No tree can want them any more.
+    """
     host, now = endpoint.host, endpoint.host.steady()
     if not endpoint.orphaned:
         endpoint.orphaned, endpoint.heard_at = True, now
@@ -170,8 +190,8 @@ def _orphan(endpoint: Endpoint) -> None:
                 host.log.info(f"{endpoint.name}: ROS is shut down; canceling its goals")
             else:
                 host.log.warning(f"{endpoint.name}: the node is gone; canceling what it left")
-    for handle in endpoint.handles:  # also one that was begun since
-        handle.goal.deadlines.disarm(Event.LOOK_OUT_DUE)  # from here nobody sees it come back
+    for handle in endpoint.handles:  # also a goal that was begun since
+        handle.goal.deadlines.disarm(Event.LOOK_OUT_DUE)  # nobody here sees it come back
         if handle.goal.outcome is None:
             tell(handle, Event.INTERRUPTED)
     silent = now - endpoint.heard_at > SILENT_FOR
@@ -180,15 +200,15 @@ def _orphan(endpoint: Endpoint) -> None:
 
 
 def move_to(endpoint: Endpoint, transport: ActionTransport) -> None:
-    """Use a transport in a participant that sees the server; nobody spins that.
+    """Use a transport in a participant that sees the server; nobody spins that participant.
 
-    A question for a result, or a cancel, is asked anew in it. Of a goal request nobody knows
-    whether it has arrived, so the old one goes on with that.
+    Questions for a result, and cancels, are asked anew there. A goal request may have arrived or
+    not, so the old transport goes on with it.
     """
     now, log = endpoint.host.steady(), endpoint.host.log
     blind, seen = route.is_absent(endpoint, now), endpoint.watch.gids
     route.deliver_arrived(endpoint)
-    if endpoint.transport.closed:  # by what came, and nobody used the endpoint
+    if endpoint.transport.closed:  # a delivery ended the last goal of an unused endpoint
         transport.close()
         return
     transport.beside_another = False
@@ -199,7 +219,7 @@ def move_to(endpoint: Endpoint, transport: ActionTransport) -> None:
         return
     log.info(f"{endpoint.name}: does not hear this node any more; a new one is heard")
     for handle in endpoint.handles:
-        if handle.replies.sent_to & seen:  # it may be shown later than another of its name
+        if handle.replies.sent_to & seen:  # the server may be shown later than another of its name
             handle.not_gone_before = max(handle.not_gone_before, now + LEASE)
         handle.goal.deadlines.suspend(ANSWERS_TAKE, endpoint.participant.now())
         tell(handle, Event.SERVER_CHANGED)
