@@ -150,7 +150,7 @@ def live() -> Figures:
         with _view(first) as address:
             window.cdp("Page.addScriptToEvaluateOnNewDocument", source=PAINTED)
             window.open(address, 1440, 900)
-            assert window.wait_for("window.page?.settled")
+            assert window.wait_for("window.page?.shown")
             window.run(f"{COUNT} page.go_tab('log'); page.go_tab('details')")
             for pane in ("", "page.select(page.run.leaves(page.s)[0], { reveal: true })"):
                 window.run(pane)
@@ -198,7 +198,7 @@ def leap() -> Figures:
         file = Path(folder) / "run.html"
         file.write_text(page(reports(first)), "utf-8")
         window.open(file, 1440, 900)
-        assert window.wait_for("window.page?.settled")
+        assert window.wait_for("window.page?.shown")
         head = window.run("return page.head")
         places = [(count * 0.618 % 1.0) * head for count in range(LEAPS)]
         return {"ms": median(window.wait(LEAP, place) for place in places)}

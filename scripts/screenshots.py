@@ -69,7 +69,7 @@ def _open(window: Browser, folder: Path, command: str, place: str) -> None:
         )
     window.open("about:blank")
     window.open(file.as_uri() + place, *SIZE)
-    assert window.wait_for("window.page?.settled")
+    assert window.wait_for("window.page?.shown")
 
 
 def _moving(window: Browser) -> Iterator[Image]:

@@ -19,7 +19,7 @@ from tests.support import browser as chromium
 from tests.support.recordings import Going
 
 ROOT = Path(__file__).parents[2]
-SETTLED = "window.page?.settled"
+SHOWN = "window.page?.shown"
 SHIFTS = """
 window.shifts = 0;
 new PerformanceObserver((list) => { for (const one of list.getEntries()) shifts += one.value; })
@@ -124,7 +124,7 @@ class Page:
     def open(self, address: str = "", width: int = 1440) -> chromium.Browser:
         self.window.open("about:blank")
         self.window.open(self.place + address, width=width, height=900)
-        assert self.window.wait_for(SETTLED)
+        assert self.window.wait_for(SHOWN)
         return self.window
 
     def text(self, where: str, words: str) -> str:

@@ -128,7 +128,7 @@ def test_at_200_percent_each_pane_has_the_window(over: Page, pane: str) -> None:
     window = over.window
     window.open("about:blank")
     window.open(f"{over.place}#pane={pane}", width=720, height=450)  # half of 1440 by 900
-    assert window.wait_for("window.page?.settled")
+    assert window.wait_for("window.page?.shown")
     assert window.run("return document.documentElement.scrollWidth") <= 720
     height = window.run(f"return document.getElementById('{pane}').clientHeight")
     assert height > 200

@@ -72,7 +72,7 @@ def test_each_run_that_goes_on_has_a_card_that_says_what_it_waits_for_and_then_w
     assert opened.run("return card.isConnected && document.activeElement === card")
     assert opened.run("return document.querySelector('#other h1').innerText") == "1 run goes on"
     opened.run("card.click()")
-    assert opened.wait_for("page.settled && page.run.info.tree === 'patrol'")
+    assert opened.wait_for("page.shown && page.run.info.tree === 'patrol'")
 
 
 def test_a_run_that_is_not_recorded_has_a_card_that_says_so(opened: chromium.Browser) -> None:
@@ -117,7 +117,7 @@ def test_the_recordings_are_listed_the_newest_first_and_can_be_sifted(
     assert found(query="patrol", world="sim") == ["01"]
     assert opened.run("return document.querySelector('.filters output').innerText") == "1 of 4"
     opened.run("document.querySelector('.records tbody tr:not([hidden]) a').click()")
-    assert opened.wait_for("page.settled && page.run.key.startsWith('0101')")
+    assert opened.wait_for("page.shown && page.run.key.startsWith('0101')")
 
 
 def test_where_several_runs_go_on_the_page_opens_with_its_front(
@@ -129,7 +129,7 @@ def test_where_several_runs_go_on_the_page_opens_with_its_front(
     window.open(served.address)
     assert window.wait_for(f"{CARDS}.length === 2")
     window.open(f"{served.address}&run={'01' * 16}")
-    assert window.wait_for("page.settled")
+    assert window.wait_for("page.shown")
     window.run("document.getElementById('switch').click()")
     assert window.wait_for("!document.getElementById('runs').hidden")
     window.run("document.querySelector('#runs .opt:last-child').click()")
@@ -164,7 +164,7 @@ def test_a_page_that_nobody_sees_keeps_no_stream_and_misses_nothing(
     opened.run(hide, False)
     assert opened.wait_for("document.querySelector('#other p').innerText === ''")
     opened.open(f"{served.address}&run={RUN_ID}")
-    assert opened.wait_for("page.settled")
+    assert opened.wait_for("page.shown")
     opened.run(hide, True)
     assert opened.run("return page.link.source.readyState") == 2
     run.write(events[8:])

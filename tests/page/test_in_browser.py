@@ -13,7 +13,7 @@ import pytest
 from bt_actions.events import Moment, RunBegan, TickLasts
 from bt_actions.recording import unrecorded
 from bt_actions.recording.folders import Summary, write_summary
-from tests.page.conftest import SETTLED, SHIFTS, Beating, Begin, Page, Served
+from tests.page.conftest import SHIFTS, SHOWN, Beating, Begin, Page, Served
 from tests.page.test_feed import told_of
 from tests.support import browser as chromium
 from tests.support.every_kind import RUN_ID
@@ -311,7 +311,7 @@ def test_a_page_that_has_taken_much_begins_anew_where_it_is(page: Page, begin: B
     window.run("page.more = 50; window.old = page.run; page.go_tab('log'); page.seek(0.4)")
     for each in events[10:]:
         run.write([each])
-    assert window.wait_for("page.run !== old && page.settled")
+    assert window.wait_for("page.run !== old && page.shown")
     assert window.wait_for("page.run.events.length === arguments[0]", len(events))
     assert window.run("return [page.t, page.tab, page.at_head]") == [0.4, "log", False]
 
@@ -321,7 +321,7 @@ def test_a_page_without_a_run_shows_the_first_that_begins(page: Page) -> None:
     page.window.open(page.place)
     page.text("#other", "No run yet")
     record(told_of())
-    assert page.window.wait_for(SETTLED)
+    assert page.window.wait_for(SHOWN)
     assert page.text("#tree-name", "all") == "all"
 
 
@@ -331,7 +331,7 @@ def test_another_run_is_a_choice_away(page: Page) -> None:
     page.window.run("document.getElementById('switch').click()")
     assert RUN_ID[:8] in page.text("#runs", RUN_ID[:8])
     page.window.run("document.querySelector('#runs .opt').click()")
-    assert page.window.wait_for(SETTLED)
+    assert page.window.wait_for(SHOWN)
 
 
 def test_names_that_hold_markup_are_text(page: Page) -> None:

@@ -167,7 +167,7 @@ def test_replay_shows_what_live_showed_at_200_events(
     run.write(events[:8])
     window.open("about:blank")
     window.open(served.address)
-    assert window.wait_for("window.page?.settled")
+    assert window.wait_for("window.page?.shown")
     window.run(SHOWN)
     window.run(
         "window.live = {}; const take = page.run.take;"
@@ -192,7 +192,7 @@ def test_replay_shows_what_live_showed_at_200_events(
     run.end()
     window.open("about:blank")
     window.open(served.address)
-    assert window.wait_for("window.page?.settled && page.run.over")
+    assert window.wait_for("window.page?.shown && page.run.over")
     window.run(SHOWN)
     counts = dice.sample(sorted(map(int, live)), 200)
     replayed = window.run("return arguments[0].map((count) => shown(page.run, count))", counts)

@@ -43,7 +43,7 @@ def test_a_page_and_graphviz_give_a_node_the_same_shape_colour_and_words(
     record([replace(began, nodes=tuple(NODES)), *events[1:2]])
     window.open("about:blank")
     window.open(f"{served.address}&view=graph")
-    window.wait_for("window.page?.settled")
+    window.wait_for("window.page?.shown")
     window.run("import('/looks.js').then((found) => { window.looks = found; })")
     assert window.wait_for("window.looks")
     wanted = [[row.node.id, *look(row), *label(row.node)] for row in rows(NODES)]

@@ -113,7 +113,7 @@ const app = {
     front?.close();
     front = null;
     app.link?.close();
-    Object.assign(app, NEW, { run: new Run(id), folded: new Set(), wanted: params });
+    Object.assign(app, NEW, { run: new Run(id), folded: new Set(), wanted: params, shown: false });
     const { run } = app;
     app.link = new (stored ? Stored : Link)(run, (what) => told(run, what));
   },
@@ -171,8 +171,11 @@ function settle() {
   app.go_tab(app.tab, false);
   app.go_view(wanted.get("view") === "graph" ? "graph" : "outline", false);
   requestAnimationFrame(() => {
+    if (app.run !== run) return;
     panes.tree.show(app.sel, 4);
     dirty = true;
+    painted = 0;
+    requestAnimationFrame(() => (app.shown = app.run === run)); // behind `frame`: the panes know their sizes by now
   });
   app.remember();
 }
