@@ -6,6 +6,7 @@ Says what is wrong with it through a callback; an unknown type is None and never
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Callable, Mapping, Sequence
 
 from bt_actions.document.checking.value_types import (
@@ -44,13 +45,21 @@ from bt_actions.utilities.suggest import what_it_has
 
 Wrong = tuple[str, str, int, int]
 """A rule's code, a message, and the columns in the expression's text."""
+_VARIANCES = {f"covariance[{at}]": (0.0, math.inf) for at in range(0, 36, 7)}
+"""The diagonal of a covariance over position and rotation."""
 _RANGES: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "geometry_msgs/msg/AccelWithCovariance": _VARIANCES,
+    "geometry_msgs/msg/PoseWithCovariance": _VARIANCES,
     "geometry_msgs/msg/Quaternion": dict.fromkeys("xyzw", (-1.0, 1.0)),
+    "geometry_msgs/msg/TwistWithCovariance": _VARIANCES,
     "sensor_msgs/msg/BatteryState": {"percentage": (0.0, 1.0)},
     "sensor_msgs/msg/NavSatFix": {"latitude": (-90.0, 90.0), "longitude": (-180.0, 180.0)},
     "sensor_msgs/msg/RelativeHumidity": {"relative_humidity": (0.0, 1.0)},
 }
-"""Fields of common messages that never leave a range, as their .msg files say: BT321."""
+"""Fields of common messages that never leave a range, as their .msg files say: BT321.
+
+A sensor's own covariance is not among them: Imu.msg says that -1 stands for an unknown one.
+"""
 _TURNED: Mapping[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.Gt, ast.LtE: ast.GtE, ast.Gt: ast.Lt, ast.GtE: ast.LtE
 }  # fmt: skip
@@ -220,6 +229,9 @@ class _Inference:
             self._wrong(node, f"{named(owner)} has no items{remedy}")
             return None
         self._index(index, kind)
+        if isinstance(node, ast.Subscript) and node.value in self._fields:
+            cls, name = self._fields[node.value]
+            self._fields[node] = cls, f"{name}[{literal!r}]"
         size = owner.size
         if size is not None and isinstance(literal, int) and not -size <= literal < size:
             self._wrong(node, f"index {literal} is outside of {size} items")
@@ -412,4 +424,5 @@ def _never_held(cls: type, name: str, op: ast.cmpop, number: float, *, first: bo
     holds = (kind in (ast.Lt, ast.LtE)) is above if ordered else kind is ast.NotEq
     outcome = "true" if holds else "false"
     percent = f"; write {number / 100:g}" if allowed == (0.0, 1.0) and 2 <= number <= 100 else ""
-    return f"{cls.__name__}.{name} is {least:g} to {most:g}: this is always {outcome}{percent}"
+    span = f"{least:g} to {most:g}" if most < math.inf else f"at least {least:g}"
+    return f"{cls.__name__}.{name} is {span}: this is always {outcome}{percent}"

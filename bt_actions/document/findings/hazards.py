@@ -183,10 +183,10 @@ HAZARDS = (
     _warning("BT321", "a comparison with what a field never holds",
         "The field's message fixes its range in a comment, and the number is outside: the "
         "comparison is always true, or always false. The charge of a battery is a fraction: 20 % "
-        "are 0.2. Known are the charge, the parts of a quaternion, latitude and longitude, and "
-        "relative humidity, where the field itself is compared with a number. A driver that has a "
-        "number of its own for what it does not know, such as -1, keeps to no range: silence the "
-        "warning there.",
+        "are 0.2. Known are the charge, the parts of a quaternion, latitude and longitude, "
+        "relative humidity, and the variances of a pose, a twist or an acceleration, where the "
+        "field itself is compared with a number. A driver that has a number of its own for what "
+        "is unknown, such as -1, keeps to no range: silence the warning there.",
         tree("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
              "root: {check: $battery.percentage < 20}\n"),
         tree("topics: {battery: {topic: battery, type: sensor_msgs/msg/BatteryState}}\n"
