@@ -14,6 +14,9 @@ import re
 import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
+
+from py_trees.behaviour import Behaviour
 
 from bt_actions import load_tree
 from bt_actions.document.describing import nodes_of
@@ -23,21 +26,37 @@ from bt_actions.render.graphviz import draw
 ROOT = Path(__file__).resolve().parent.parent
 PICTURES = {
     ROOT / "docs/images/first_tree.svg": ROOT / "examples/first/first.yaml",
+    ROOT / "docs/images/leaf_by_leaf.svg": ROOT / "docs/tutorials/leaf_by_leaf.md",
+    ROOT / "docs/images/own_action.svg": ROOT / "examples/dock/dock.yaml",
     ROOT / "docs/images/pick_and_place.svg": ROOT / "trees/pick_and_place.yaml",
 }
-"""Each picture, and the tree that it shows."""
+"""Each picture, and the file of the tree that it shows."""
+STAND_INS = ROOT / "tests/support/stand_ins"
 
 _PLACED = {"cx", "cy", "d", "height", "points", "rx", "ry", "transform", "viewBox", "width"}
 _PLACED |= {"x", "y"}
 
 
 def source(picture: Path) -> str:
-    """The dot source of a picture."""
-    return dot(nodes_of(load_tree(PICTURES[picture])))
+    """Return the dot source of a picture. No type is looked up: some are not installed here."""
+    shown = PICTURES[picture]
+    root = load_tree(shown, types=False) if shown.suffix == ".yaml" else _there(shown)
+    return dot(nodes_of(root))
+
+
+def _there(page: Path) -> Behaviour:
+    """Return the tree that the first program of py_trees_ros on a page makes."""
+    _, program = page.read_text(encoding="utf-8").split("```python there\n", 1)
+    made: dict[str, Any] = {"__name__": page.stem}
+    sys.path.append(str(STAND_INS))
+    exec(program.partition("rclpy.init()")[0], made)
+    sys.path.remove(str(STAND_INS))
+    root: Behaviour = made["root"]
+    return root
 
 
 def drawn(picture: Path) -> str:
-    """A picture, with a note of what it was made from."""
+    """Return a picture, with a note of what it was made from."""
     tree = PICTURES[picture].relative_to(ROOT)
     note = f"<!-- Made by `make docs` from {tree}. Do not edit. dot: {_digest(picture)} -->"
     image = draw(source(picture), "svg").decode()
@@ -45,7 +64,7 @@ def drawn(picture: Path) -> str:
 
 
 def seen(image: str) -> list[tuple[str, str, tuple[tuple[str, str], ...]]]:
-    """What an SVG shows: its elements with their texts and attributes, but not where they are."""
+    """Return what an SVG shows: elements with texts and attributes, without coordinates."""
     return [
         (
             element.tag,
@@ -57,7 +76,7 @@ def seen(image: str) -> list[tuple[str, str, tuple[tuple[str, str], ...]]]:
 
 
 def is_fresh(picture: Path) -> bool:
-    """Whether a picture shows its tree as it is drawn now."""
+    """Tell whether a picture shows its tree as it is drawn now."""
     if not picture.is_file():
         return False
     image = picture.read_text(encoding="utf-8")

@@ -7,20 +7,24 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.support.environments import HIDDEN, copy_environment, own_commands
 from tests.support.middleware import on_loopback
+from tests.support.processes import HostFactory, Process
 
 ROOT = Path(__file__).parents[1]
 PAGES = ROOT / "docs" / "tutorials"
+STAND_INS = ROOT / "tests" / "support" / "stand_ins"
 BLOCK = re.compile(r"(?:`([^`\n]+)`:\n\n)?^```(\w+)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 """What a block is in, where the line before it says so: its file, its language, its text."""
 
 PATIENCE = 900.0
 """Seconds for a build of messages on a machine that does other work besides."""
+Start = Callable[..., Process]
 CAN_BUILD = (Path(sys.prefix) / "share" / "rosidl_runtime_c" / "cmake").is_dir()
 
 
@@ -80,13 +84,18 @@ class Reader:
         (self._where / path).write_text(text.replace(old, new))
 
 
+def assert_drawn(tree: Path) -> None:
+    """Find a page's tree in examples/, whence the page's picture is made."""
+    drawn = ROOT / "examples" / tree.stem / tree.name
+    assert tree.read_text(encoding="utf-8") == drawn.read_text(encoding="utf-8")
+
+
 pytestmark = [pytest.mark.ros, pytest.mark.usefixtures("domain")]
 
 
 def test_the_first_tree(tmp_path: Path) -> None:
     assert Reader(tmp_path).follow("first_tree.md") == [0, 1, 0, 0]
-    shown = ROOT / "examples" / "first" / "first.yaml"  # in the picture
-    assert (tmp_path / "first.yaml").read_text() == shown.read_text()
+    assert_drawn(tmp_path / "first.yaml")
 
 
 @pytest.mark.slow
@@ -98,10 +107,28 @@ def test_an_action_of_ones_own(tmp_path: Path) -> None:
     own_commands(prefix, "bt-actions", "pytest")
     assert Reader(tmp_path, prefix).follow("own_action.md") == [0, 0, 1, 0, 0]
     shutil.rmtree(prefix)
+    assert_drawn(tmp_path / "dock.yaml")
 
 
 def test_from_py_trees_ros_leaf_by_leaf(tmp_path: Path) -> None:
     assert Reader(tmp_path).follow("leaf_by_leaf.md") == [0, 0, 0]
+
+
+@pytest.mark.parametrize("leaves", ["all of py_trees_ros", "the drive of ours"])
+def test_the_programs_of_py_trees_ros_fetch_the_part_with_a_stand_in(
+    leaves: str, tmp_path: Path, start_program: Start, new_host: HostFactory
+) -> None:
+    page = (PAGES / "leaf_by_leaf.md").read_text(encoding="utf-8")
+    text, added = re.findall(r"^```python there\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    assert text.count("\nroot = ") == 1
+    if leaves == "the drive of ours":
+        text = text.replace("\nroot = ", f"\n{added}root = ")
+    new_host().robot("", "1:abort", speed=20.0)
+    (tmp_path / "there.py").write_text(text, encoding="utf-8")
+    paths = {"PYTHONPATH": f"{ROOT}:{STAND_INS}"}
+    program = start_program(str(tmp_path / "there.py"), environment=paths)
+    assert program.wait(40.0) == 0, program
+    assert program.lines[-1] == "Status.SUCCESS", program
 
 
 def test_it_failed_at_night(tmp_path: Path) -> None:
