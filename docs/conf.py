@@ -3,7 +3,6 @@ pages are built. The Markdown stays as GitHub shows it: what only the site needs
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 from pygments.lexers.special import TextLexer
@@ -42,15 +41,14 @@ NAVIGATION = {
         f"coming_from/{name}"
         for name in ("py_trees_ros", "nav2", "behaviortree_cpp", "yasmin", "scenario_execution")
     ],
-    "How it is made": ["architecture", "goal", "glossary"],
+    "How it is made": ["CONTRIBUTING", "architecture", "goal", "glossary"],
 }
 
 
 def front_page(index: str) -> str:
     """Return the README, all pages below it, and the navigation at the side."""
     readme = README.read_text(encoding="utf-8").replace("](docs/", "](")
-    pages = index.replace("# All pages", "## All pages", 1)
-    parts = [readme.replace("](CONTRIBUTING.md", "](../CONTRIBUTING.md"), pages]
+    parts = [readme, index.replace("# All pages", "## All pages", 1)]
     for caption, names in NAVIGATION.items():
         parts.append("\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "", *names]))
         parts.append("```")
@@ -60,8 +58,7 @@ def front_page(index: str) -> str:
 def read(_app: Sphinx, name: str, source: list[str]) -> None:
     """Make of a page of the repository a page of the site."""
     text = front_page(source[0]) if name == "index" else source[0]
-    text = text.replace("](../README.md", "](index.md")
-    source[0] = re.sub(r"\[([^]]*)\]\(\.\./CONTRIBUTING\.md\)", r"`\1`", text)
+    source[0] = text.replace("](../README.md", "](index.md")
 
 
 def setup(app: Sphinx) -> None:

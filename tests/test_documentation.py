@@ -108,7 +108,7 @@ def test_the_example_of_a_tree_as_an_action_delivers_and_ends_at_a_cancel_reques
     assert robot.ends() == ["succeeded", "succeeded", "canceled"]
 
 
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def _anchors(page: Path) -> set[str]:

@@ -41,7 +41,7 @@ root:
 def often() -> Iterator[type[decorators.Gate]]:
     """Add what CONTRIBUTING.md adds, and return its behaviour's class."""
     kinds, keys = dict(KINDS), set(NODE_KEYS)
-    behaviour, kind = CODE.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
+    behaviour, kind = CODE.findall((ROOT / "docs" / "CONTRIBUTING.md").read_text(encoding="utf-8"))
     with pytest.MonkeyPatch.context() as patch:
         space = dict(vars(decorators))
         exec(behaviour, space)
