@@ -1,1 +1,1 @@
-"""Knowledge of the server on the other side. No ROS, no thread."""
+"""The knowledge of the server on the other side. No ROS, no thread."""

@@ -1,13 +1,13 @@
-"""One action server, seen from outside: is it there, alone, and still the same?
+"""One action server, seen from outside: whether it is there, alone, and still the same.
 
-Fed with what discovery shows (readiness, and the GIDs of who reads goal requests) and with the
-answers to probes. No ROS, no thread, no clock of its own; it sends nothing: `wants_probe` says
-that a probe is due.
+The watch takes what discovery shows (readiness, and the GIDs of the readers of goal requests), and
+the answers to probes. No ROS, no thread, no clock of its own. The watch sends nothing:
+`wants_probe` says that a probe is due.
 
-Two readers of goal requests are not yet two servers: a server that was killed stays in
-discovery until its lease runs out (20 s with Fast DDS as it comes). A probe is a question
-that every live server answers once. Two answers: two servers. One answer and then silence: a
-dead server and its successor.
+Two readers of goal requests are not yet two servers: a server that was killed stays in discovery
+until its lease runs out (20 s with Fast DDS as it comes). A probe is a question that every live
+server answers once. Two answers mean two servers. One answer and then silence mean a dead server
+and its successor.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from bt_actions.goals.terms import NEVER
 GID = bytes
 
 PROBE_EVERY = 0.5
-"""Seconds between probes while it is open who is alive."""
+"""Seconds between probes while a server in sight may be alive or dead."""
 NO_SECOND_AFTER = 1.0
-"""Seconds of silence after a probe's first answer until a second one is not expected any more,"""
+"""Seconds of silence after a probe's first answer until no second one is expected any more,"""
 SLOWEST_START = 3.0
 """and seconds within which a server that has just come in sight answers (0.15 to 2.7 measured)."""
 PROBES_KEPT = 20
-"""Probes whose answers are counted; of those before, none is expected any more."""
+"""Probes whose answers are counted; older probes expect no answer."""
 LEASE = 25.0
-"""Seconds after which no dead server is shown: one that still is, is there."""
+"""Seconds after which no dead server is shown: a server that still is shown lives."""
 NOT_READY_FOR = 2.0
 """Seconds without readiness and without a word, though requests would be read, until the server
 counts as gone."""
 
 
 class Server(Enum):
-    """The servers that answer under a name."""
+    """The state of the servers that answer under a name."""
 
     ABSENT = "absent"
     READY = "ready"
     UNCLEAR = "unclear"
-    """More than one is shown, and it is not known yet which of them live."""
+    """Several are shown, and it is not known yet which of them live."""
     AMBIGUOUS = "ambiguous"
 
 
@@ -50,32 +50,33 @@ class _Probe:
     sent: float
     answers: int = 0
     first: float = NEVER
-    """When its first answer came."""
+    """The moment of the first answer."""
 
 
 class ServerWatch:
-    """The picture of one server, kept from observations at any times the caller likes."""
+    """The picture of one server, drawn from observations at any times the caller likes."""
 
     def __init__(self) -> None:
         self.gids: frozenset[GID] = frozenset()
         self.in_sight_since = NEVER
-        """Since when a server has been shown without a break that was seen."""
+        """The moment from which on a server has been shown, without a gap that was seen."""
         self.alone = False
-        """More GIDs than one are shown, but only one server answers."""
+        """Whether several GIDs are shown, but only one server answers."""
         self._unready_since = math.inf
         self.crowded_since = math.inf
-        """Since when all that are shown now have been, if they are several."""
+        """The moment from which on all servers that are shown now have been, if they are
+        several."""
         self._not_alone_before = NEVER
         self._probed_at = NEVER
         self._probes: dict[bytes, _Probe] = {}  # by the ids that they ask for
         self.heard_at = NEVER
-        """When any word of a server came: whoever speaks is there."""
+        """The moment of the last word of a server: a server that speaks is there."""
         self._most_answers = 0  # to one question
 
     def see(self, now: float, ready: bool, gids: frozenset[GID], *, concludes: bool = True) -> None:
         """Take what discovery shows at `now` (seconds, steady clock).
 
-        `concludes`: whether all answers that have come are in, so that silence means something.
+        `concludes`: whether all arrived answers are in, so that silence means something.
         """
         if self.state(now) is Server.ABSENT:
             self.in_sight_since = now
@@ -90,12 +91,12 @@ class ServerWatch:
             self.alone = self._answered_once(now, self.crowded_since)
 
     def stood_still(self, now: float) -> None:
-        """Take note that nobody listened for a while: answers of that time are yet to come in."""
+        """Take note of a stall of this process: answers of that time are yet to come in."""
         self._not_alone_before = now + NO_SECOND_AFTER
 
     @property
     def is_crowded(self) -> bool:
-        """Whether more than one server is shown."""
+        """Whether several servers are shown."""
         return len(self.gids) > 1
 
     def _answered_once(self, now: float, sent_since: float) -> bool:
@@ -105,9 +106,9 @@ class ServerWatch:
         )
 
     def alone_since(self, now: float, moment: float) -> bool:
-        """Return whether one server answers alone, now and to all that was sent since `moment`.
+        """Return whether one server answers alone, now and to all requests since `moment`.
 
-        So whoever has answered anything at `moment` is the only one.
+        The sender of any answer at `moment` is then the only server.
         """
         return self.state(now) is Server.READY and self.alone and self._answered_once(now, moment)
 
@@ -118,7 +119,7 @@ class ServerWatch:
             del self._probes[next(iter(self._probes))]
 
     def probe_answered(self, now: float, goal_id: bytes) -> bool:
-        """Take one answer, if it is to a probe that is no older than who is shown; return that."""
+        """Take an answer; return whether the probe is no older than the servers that are shown."""
         probe = self._probes.get(goal_id)
         if probe is None:
             return False
@@ -130,26 +131,27 @@ class ServerWatch:
         return True
 
     def two_answered(self, answers: int = 2) -> None:
-        """Take note that two, or more, have answered one question, a probe or another."""
+        """Take note that several servers have answered one question, a probe or another."""
         if self.is_crowded:
             self._most_answers = max(self._most_answers, answers)
             self.alone = False
 
     @property
     def both_live(self) -> bool:
-        """Whether two of those that are shown have answered one question."""
+        """Whether two of the servers that are shown have answered one question."""
         return self._most_answers > 1
 
     def all_live(self, now: float) -> bool:
-        """Return whether more than one is shown, and all live: so many answered one question.
+        """Return whether several servers are shown, and all of them live.
 
-        Or two did, and a dead one would not be shown any more.
+        All live if that many have answered one question; or if two have, for so long that a dead
+        server would not be shown any more.
         """
         none_dead = self._most_answers >= len(self.gids) or now - self.crowded_since > LEASE
         return self.both_live and none_dead
 
     def state(self, now: float) -> Server:
-        """Return what answers under the name, as far as is known at `now`."""
+        """Return the state of the servers under the name, as far as is known at `now`."""
         if self._unready_since < math.inf or not self.gids:
             return Server.ABSENT
         if not self.is_crowded:
@@ -160,9 +162,9 @@ class ServerWatch:
         return Server.READY if self.alone else Server.UNCLEAR
 
     def wants_probe(self, now: float, *, runs: bool = False) -> bool:
-        """Return whether a probe is due; the caller sends one when this says so.
+        """Return whether a probe is due; the caller sends one at a True.
 
-        `runs`: goals may run here, so that it matters whether one that is not ready is gone.
+        `runs`: whether goals may run here, so that an unready server must be told from a gone one.
         """
         is_open = self.is_crowded and not self.both_live
         is_open |= runs and self._unready_since < math.inf and bool(self.gids)
@@ -172,10 +174,10 @@ class ServerWatch:
         return True
 
     def gone(self, now: float, sent_to: frozenset[GID]) -> bool:
-        """Return whether none of the servers that a goal was sent to is there any more.
+        """Return whether no server that the goal was sent to is there any more.
 
-        One that is not ready is gone if nothing is heard, and no other is in sight: readiness is
-        that of the name, and a second server that is discovered in part takes it away.
+        An unready server is gone if it is silent, and no other is in sight: readiness is that of
+        the name, and a second server that is discovered in part takes it away.
         """
         if not sent_to & self.gids:
             return True

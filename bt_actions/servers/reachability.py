@@ -1,11 +1,11 @@
-"""Does a server that is in sight hear what one client asks, and does the client hear its answers?
+"""Whether a server in sight hears one client, and the client hears the server.
 
-Discovery may tell one side only: a server may have dropped a process that was stopped, or cut off,
-for longer than its lease, and never take it in again (ros/rediscovery.py). It is shown then, and
-what it is asked gets lost. Told of questions and answers; what takes a server long (a busy
-executor) shows in the same way, so silence is no proof. Nor may it be filled with questions: a
-server keeps the last ten requests of all its clients together, and answers no other. No ROS, no
-thread, no clock of its own.
+Discovery may work in one direction only: a server may have dropped a process that was stopped, or
+cut off, for longer than its lease, and never take that process in again (ros/rediscovery.py). Such
+a server is shown, and requests to it are lost. The evidence is questions and answers. A server with
+a busy executor is silent, too, so silence is no proof. Many questions would do harm: a server keeps
+the last ten requests of all its clients together, and drops older ones. No ROS, no thread, no clock
+of its own.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import math
 from bt_actions.goals.terms import NEVER
 
 AT_ONCE, TWICE = (0.0,), (0.0, 3.0)
-"""Seconds after which to ask. A new participant is asked in twice: it may be known to all only when
+"""Seconds after which to ask. A new participant asks twice: all processes may know it only when
 Fast DDS announces it the next time, after 3 s."""
 UNRESPONSIVE_AFTER = 2.0
-"""Seconds without an answer to any question until the server may not hear them;"""
+"""Seconds without an answer to any question until the server may not hear the client;"""
 TRIES = 2
-"""so often is another way looked for while it is silent,"""
+"""the number of searches for another way while the server is silent,"""
 TRY_LASTS = 5.5
-"""each for so many seconds;"""
+"""the seconds that each takes,"""
 TRY_AGAIN = 60.0
-"""and then only after so many since the last."""
+"""and the seconds after the last one until the next begins all the same."""
 DOUBT_LASTS = 10.0
-"""Seconds after a stall within which a way to be heard is found, if there is one."""
+"""Seconds after a stall within which a way to be heard is found, if one exists."""
 
 
 class Reachability:
@@ -37,7 +37,7 @@ class Reachability:
         """Whether any question was ever answered."""
         self._unanswered_since = math.inf
         self._ask_at: list[float] = []
-        """When to ask just in order to be answered."""
+        """The moments of questions that are asked for an answer alone."""
         self._in_doubt_until = NEVER
         self._tries, self._tried_at = 0, NEVER
 
@@ -52,10 +52,12 @@ class Reachability:
             self._unanswered_since, self._ask_at, self._tries = math.inf, [], 0
             self._in_doubt_until = NEVER
         elif self._in_doubt_until > NEVER and not self._ask_at:
-            self._ask_at = [asked]  # who answers what was asked before is not busy
+            self._ask_at = [asked]  # a server that answers old questions is not busy
 
     def doubt(self, now: float, ask_after: tuple[float, ...] = AT_ONCE) -> None:
-        """Doubt what was heard before, as this process stood still: the server is to be asked.
+        """Doubt that the server still hears the client, as this process stood still.
+
+        Ask the server.
 
         Where a doubt is open, the server has been asked already.
         """
@@ -65,25 +67,25 @@ class Reachability:
         self._in_doubt_until = now + DOUBT_LASTS
 
     def in_doubt(self, now: float) -> float:
-        """Return for how many seconds silence may mean this more than anything else; or 0."""
+        """Return the seconds for which silence most likely means that no server hears us; or 0."""
         return max(0.0, self._in_doubt_until - now)
 
     def take_question(self, now: float) -> bool:
-        """Return whether to ask just in order to be answered; each question is due once."""
+        """Return whether to ask a question for its answer alone; each question is due once."""
         if not self._ask_at or now < self._ask_at[0]:
             return False
         del self._ask_at[0]
         return True
 
     def tried(self, now: float) -> None:
-        """Take note that another way is looked for from now on."""
+        """Take note that the search for another way begins."""
         self._tries += 1
         self._tried_at = now
 
     def is_unresponsive(self, now: float) -> bool:
         """Return whether no question was answered for long, and another way may be looked for.
 
-        Also while that is done.
+        True also while that search goes on.
         """
         if now - self._unanswered_since < UNRESPONSIVE_AFTER:
             return False
