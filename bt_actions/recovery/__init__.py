@@ -1,1 +1,1 @@
-"""After a process was killed: what it left running, and cleaning that up."""
+"""The goals that a killed process left running, and their cleanup."""

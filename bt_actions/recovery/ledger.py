@@ -1,15 +1,15 @@
-"""Goals of this process without an answer yet, on record should it be killed. No ROS.
+"""The ledger: goals of this process without an answer yet, on record should it be killed. No ROS.
 
-A server shows the goals that it has accepted. Of one that it has received, and has not decided on
-yet, nobody knows but the sender, and a sender that is killed tells nobody; the robot moves later.
-So each process has a file, named by what its goals' ids begin with (ids.py), with a slot for
-each goal without an answer. The file outlives a process that is killed, and cleanup reads it
-(recovery/sweep.py). It lies in memory (/dev/shm), in a directory that only this user may write to,
-and is mapped: a call of the system's for each goal would give Python's lock away.
+A server shows the goals that it has accepted. A goal that a server has received, and has not
+decided on yet, is known to its sender alone. A sender that is killed tells nobody, and the robot
+moves later. So each process has a file, named by the beginning of its goals' ids (ids.py), with a
+slot for each goal without an answer. The file outlives a killed process, and cleanup reads it
+(recovery/sweep.py). The file lies in memory (/dev/shm), in a directory that only this user may
+write to, and is mapped: a system call for each goal would give Python's lock away.
 
-A slot is written before the goal is sent, and blank again when that has been answered; not where
-its server went away, which may only stand still. A record proves no more than that a
-question about a goal is worth asking.
+A slot is written before the goal is sent, and blanked when the request has been answered. The slot
+stays where the server went away, because that server may only stand still. A record proves no more
+than that a question about a goal is worth asking.
 """
 
 from __future__ import annotations
@@ -34,39 +34,43 @@ DIRECTORY = "BT_ACTIONS_LEDGER"
 LENGTH = 1024
 """Bytes of a slot; the longest action name has 255."""
 SERVERS_AT_MOST = 8
-"""Servers of a goal on record; where there are more, none is."""
+"""Servers of a goal on record; of a goal with more of them none is."""
 KEPT_FOR = 86400.0
-"""Seconds after which a file is removed that nobody has cleaned up."""
+"""Seconds after which a file is removed that no cleanup has read."""
 _TOUCHED_EVERY = 1.0
-"""Seconds: what is written to a map does not show in the file's time; nor, that it was removed."""
+"""Seconds between two looks at the file: a write to a map leaves the file's time alone, and
+succeeds though the file was removed."""
 _MORE = 16 * LENGTH
 _SUFFIX = ".goals"
 _BLANK = b"\0"
-"""A slot begins with it where nothing counts: not yet, while it is written."""
+"""The first byte of a slot that does not count: blank, or while it is written."""
 _AUTHOR = 12
-"""Bytes of a goal's id that tell its process."""
+"""Bytes of a goal's id that name its process."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sent(Entry):
-    """A goal that a process sent, of whose answer that process knew nothing when it ended."""
+    """A goal that a process sent, and whose answer that process did not know when it ended."""
 
     goal_id: bytes
     author: Author
     """The process, which is dead, or not `here`."""
     path: Path
     at: int
-    """Where in the file its slot begins."""
+    """The offset of its slot in the file."""
 
     def strike(self) -> None:
-        """Ask no more for this goal; where that cannot be written, it is asked for again."""
+        """Take the goal off the record.
+
+        Where the file cannot be written, a later cleanup asks again.
+        """
         self._write(_BLANK)
         with contextlib.suppress(OSError):
             if _is_blank(self.path):
                 self.path.unlink()
 
     def mark_lost(self) -> None:
-        """Have it on record that its servers are not in sight."""
+        """Put on record that the goal's servers are not in sight."""
         self._write(_slot(self.goal_id, replace(self, lost=True)))
 
     def _write(self, text: bytes) -> None:
@@ -75,9 +79,9 @@ class Sent(Entry):
 
 
 class Ledger(Record):
-    """The record of this process. Under its caller's lock; nothing here raises.
+    """The record of this process. The caller holds a lock; nothing here raises.
 
-    `complain` is called once with why a goal is not on record, should that happen.
+    `complain` gets, once, the reason why a goal is not on record.
     """
 
     def __init__(self, complain: Callable[[str], None]) -> None:
@@ -95,7 +99,7 @@ class Ledger(Record):
         return goal_id in self._slots
 
     def enter(self, goal_id: bytes, entry: Entry) -> None:
-        """Put a goal on record that is about to be sent, or what more is known of it."""
+        """Put a goal on record before its request is sent, or update its facts on record."""
         if len(entry.servers) > SERVERS_AT_MOST:
             entry = replace(entry, servers=frozenset())
         try:
@@ -122,7 +126,7 @@ class Ledger(Record):
             self._touched_at = now
             if os.fstat(self._file).st_nlink:
                 os.utime(self._file)
-            else:  # who logs out may have all of /dev/shm removed
+            else:  # a logout may have removed all of /dev/shm
                 self.disown()
 
     def _grown(self, goal_id: bytes) -> mmap.mmap:
@@ -154,7 +158,7 @@ class Ledger(Record):
         self.disown()
 
     def disown(self) -> None:
-        """Let go of all, as the child of a fork: it is the parent's."""
+        """Close the map in the child of a fork: the file is the parent's."""
         if self._file is not None:
             os.close(self._file)
         self._file = self._map = None
@@ -163,9 +167,9 @@ class Ledger(Record):
 
 
 def left_behind(passed_over: Collection[Path] = ()) -> Iterator[Sent | OSError]:
-    """Find what this user's processes have left on record that are dead, or elsewhere.
+    """Find the goals on record of this user's processes that are dead, or elsewhere.
 
-    Files in `passed_over` are not read. For one that cannot be read an OSError comes.
+    Files in `passed_over` are not read. An unreadable file yields an OSError.
     """
     try:
         home = directory(make=False)
@@ -192,14 +196,14 @@ def left_behind(passed_over: Collection[Path] = ()) -> Iterator[Sent | OSError]:
 
 
 def directory(*, make: bool = True) -> Path:
-    """Return where the records are.
+    """Return the directory of the records.
 
-    Raises OSError where that depends on where one stands, or others could put something into it.
+    Raises OSError where the path depends on the current directory, or where others could write.
     """
     named = os.environ.get(DIRECTORY)
     if named and not Path(named).is_absolute():
         raise OSError(errno.EINVAL, f"{DIRECTORY} is no absolute path", named)
-    # What others may have made there is not used, as is seen below
+    # A directory that others made there is not used, as the check below shows
     shared = "/dev/shm"  # nosec B108
     found = Path(named or f"{shared}/bt_actions-{os.geteuid()}")
     if make:
@@ -212,7 +216,7 @@ def directory(*, make: bool = True) -> Path:
 
 
 def _gone_author(path: Path) -> Author | None:
-    """Return whose file it is, if it is dead, or elsewhere; None: nobody's of ours."""
+    """Return the author of a file, if dead or elsewhere; None for all other files."""
     try:
         author = author_of(bytes.fromhex(path.stem).ljust(16, b"\0"))
     except ValueError:
@@ -221,7 +225,7 @@ def _gone_author(path: Path) -> Author | None:
 
 
 def _slot(goal_id: bytes, entry: Entry) -> bytes:
-    """Return what a slot holds, in JSON."""
+    """Return the content of a slot, in JSON."""
     return f'{{"goal": "{goal_id.hex()}", {_written(entry)[1:]}'.encode().ljust(LENGTH)
 
 
@@ -238,7 +242,7 @@ def _written(entry: Entry) -> str:
 
 
 def _read(slot: bytes, author: Author, path: Path, at: int) -> Sent | OSError:
-    """Return what is in a slot, or what to say where it makes no sense."""
+    """Return the goal in a slot, or an error for a slot that makes no sense."""
     try:
         entry = json.loads(slot)
         goal_id = bytes.fromhex(entry.pop("goal"))
@@ -257,7 +261,7 @@ def _is_blank(path: Path) -> bool:
 
 
 def _tidy(directory: Path) -> None:
-    """Remove what the dead have left where nobody has wanted it for long, or nothing is on it."""
+    """Remove files of dead processes that are old, or have no goal on them."""
     for path in directory.glob("*" + _SUFFIX):
         with contextlib.suppress(OSError):
             is_old = time.time() - path.lstat().st_mtime > KEPT_FOR

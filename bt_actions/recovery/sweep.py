@@ -1,14 +1,14 @@
-"""Finds and cancels goals that a killed orchestrator left on servers it can no longer speak to.
+"""The sweep: goals that a killed orchestrator left on servers are found and canceled.
 
 A process that dies by SIGKILL cancels nothing. Its goals are found in the status topics of all
-actions in sight, told by their ids (ids.py), and canceled one by one; goals of other clients,
-and of orchestrators that are alive, or that cannot be looked for from here, are never touched. No
-action type is needed for any of it. That a server has nothing to tell is believed when it has
-answered for long enough (roll_call.py).
+actions in sight, recognized by their ids (ids.py), and canceled one by one. Goals of other clients,
+of living orchestrators, and of orchestrators that this machine cannot look for, are never touched.
+No action type is needed for any of it. A server has nothing to tell when it has answered for long
+enough (roll_call.py).
 
-No status shows a goal that its server has not accepted yet. That it was sent is on its sender's
-record (ledger.py), and it is awaited until a server shows it, or it is sure that none will: its
-server is asked again and again to cancel it.
+No status shows a goal that its server has not accepted yet. Such a goal is on its sender's record
+(ledger.py). The sweep awaits the goal until a server shows it, or until it is sure that none will,
+and asks the server again and again to cancel it.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from bt_actions.traffic.stalls import Stalls
 from bt_actions.utilities.ids import Author, author_of
 
 TURN = 0.1
-"""Seconds between two looks for what has come in, at the graph, and for who is still alive."""
+"""Seconds between two turns: arrived messages, the graph, and the authors' lives are looked at."""
 LOOK_LONGEST = 30.0
 """Seconds for which servers may take to answer, in all: a dead server is shown for 20."""
 AWAIT_LONGER = 2 * SETTLE
-"""Seconds by which a goal is awaited longer, at most, than servers are looked for and deny it."""
+"""Seconds, at most, by which a goal is awaited longer than servers are looked for and deny it."""
 LOOK_AGAIN = 10.0
-"""Seconds after which, at the latest, a participant that is not answered gives way to another."""
+"""Seconds, at most, after which a participant without answers gives way to another."""
 CANCELS_A_TURN = 5
-"""So many goals of an action at once: a server keeps its last ten requests only."""
+"""Cancels of one action in a turn: a server keeps its last ten requests only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,37 +48,39 @@ class Swept:
 
     left: list[LeftBehind]
     known: list[str]
-    """The actions of which every server has told what it runs."""
+    """The actions whose servers have all told their goals."""
     unknown: dict[str, str]
-    """The others that were asked, each with the reason, in whose braces belongs its name."""
+    """The other actions that were asked, each with the reason; its name belongs in the braces."""
     domain: int
     """The ROS domain in force."""
     trouble: OSError | None
-    """Why nobody can read what was sent and is not answered."""
+    """The reason why the records cannot be read."""
     missing: list[str]
     """The goals of `unknown` that were looked for in vain."""
     elsewhere: dict[bytes, str]
-    """Unfinished goals of bt_actions processes on other machines, or in other containers, of which
-    nobody here can tell whether they are alive: the action of each."""
+    """Unfinished goals of bt_actions processes on other machines, or in other containers, whose
+    life this machine cannot see: the action of each."""
 
 
 @dataclass(kw_only=True)
 class Cleanup:
-    """Cancels what dead orchestrators of this machine left; `run` returns it with its ends.
+    """The cancel of goals that dead orchestrators of this machine left.
 
-    Looks for servers for `look` seconds, and waits `patience` seconds more for the goals that it
-    canceled to end. `found` is called with each at once, and again where it was `awaited` when it
+    `run` returns them with ends.
+
+    The cleanup looks for servers for `look` seconds, and waits `patience` seconds more for its
+    canceled goals to end. `found` gets each goal at once, and again where it was `awaited` and
     turns up. The actions in `wanted`, by the full names of their servers (None: all in sight), and
-    those of goals that were found, are looked at until they are known, for LOOK_LONGEST seconds at
-    most, or `look`, if that is more; `waits` is called with those that are not, once, when it
-    begins to wait for one that is silent. Ends in the next turn when `stopped` says so. Blocks.
+    those of found goals, are looked at until they are known, for LOOK_LONGEST seconds at most, or
+    `look`, if that is more. `waits` gets the silent ones, once, when the wait for them begins. The
+    cleanup ends in the turn after `stopped` returns True. Blocks.
 
-    A goal that was sent and not answered is awaited: until it has been denied for `accept` seconds,
+    A goal that was sent and not answered is awaited until it has been denied for `accept` seconds,
     for as long as its sender gave the server to decide, and for DENIED_FOR_GOOD, whichever is most.
 
-    Where a server in sight does not answer, or this process stands still for long meanwhile, it may
-    be that it will never tell this participant anything (ros/rediscovery.py). So it looks again
-    with a new one, twice at most.
+    A server in sight that does not answer may never tell this participant anything
+    (ros/rediscovery.py), and neither may one after a long stall of this process. The cleanup looks
+    again with a new participant, twice at most.
 
     Raises ValueError for seconds that are negative or no number.
     """
@@ -97,19 +99,22 @@ class Cleanup:
             raise ValueError(f"look, patience, accept: seconds are 0 or more, not {seconds}")
         self._deadline = time.monotonic() + max(self.look, LOOK_LONGEST)
         self._has_waited = False
-        self._calls: dict[str, RollCall] = {}  # by action, as long as this goes on
+        self._calls: dict[str, RollCall] = {}  # by action
         self._elsewhere: dict[bytes, str] = {}
-        self._of_others: dict[bytes, tuple[RollCall, Author]] = {}  # whose author is alive, or was
+        self._of_others: dict[bytes, tuple[RollCall, Author]] = {}  # goals of living authors
         self._left: dict[bytes, LeftBehind] = {}
-        self._sent: dict[bytes, Sent] = {}  # by the dead of here, and not answered
+        self._sent: dict[bytes, Sent] = {}  # requests of dead authors here, without an answer
         self._read_before: set[Path] = set()
         self._trouble: OSError | None = None
 
     def run(self) -> Swept:
-        """Do it. Raises CannotStart, if nothing has been looked at yet."""
+        """Find and cancel the goals, and return what was seen.
+
+        Raises CannotStart, if nothing has been looked at yet.
+        """
         for tries_before in range(3):
             still = Stalls()
-            still.lives(time.monotonic())  # it counts from when the participant is made
+            still.lives(time.monotonic())  # stalls count from the making of the participant
             try:
                 with onlooker() as sight:
                     self._begin(sight)
@@ -122,7 +127,7 @@ class Cleanup:
         return self._ends()
 
     def _begin(self, sight: Onlooker) -> None:
-        """Go on with what is seen in this participant."""
+        """Go on with the sight of this participant."""
         self._sight = sight
         self._views: dict[RollCall, ActionView] = {}
         self._questions: dict[tuple[RollCall, int], LeftBehind] = {}
@@ -131,16 +136,16 @@ class Cleanup:
             call.begin()
         for left in self._left.values():
             left.denials.begin()
-        self._find()  # before the first status: one that tells an end comes once
+        self._find()  # before the first status: the status of an end comes once
 
     def _call(self, action: str) -> RollCall:
-        """Return what is known of an action's servers; it is looked for from now on."""
+        """Return the roll call of an action's servers, which are looked for from now on."""
         return self._calls.setdefault(action, RollCall(action))
 
     def _goes_through(self, still: Stalls, *, breaks_off: bool) -> bool:
         """Look, cancel, and wait; return False where it `breaks_off`, for another participant.
 
-        Because of a stall, or of a server in sight that does not answer.
+        A stall breaks off, and so does a server in sight that does not answer.
         """
         began = looked = time.monotonic()
         until = began + self.look
@@ -148,8 +153,8 @@ class Cleanup:
             now = time.monotonic()
             self._deadline += still.lives(now)
             if still.long_times and breaks_off:
-                return False  # what was sent meanwhile may be lost
-            # What there is may not be in sight again
+                return False  # messages of that time may be lost
+            # A living server may not be in sight again yet
             until = max(until, now + still.answers_take(now), now + still.servers_take(now))
             self._turn(still)
             lacks = self._lacks()
@@ -164,7 +169,7 @@ class Cleanup:
                     self._has_waited = True
                     self.waits(sorted(call.action for call in overdue))
                 if breaks_off and any(call.servers for call in overdue):
-                    return False  # it may not hear this participant
+                    return False  # the server may not hear this participant
             time.sleep(TURN)
         return True
 
@@ -188,10 +193,10 @@ class Cleanup:
         )
 
     def _keep_record(self) -> None:
-        """Take off the record what is over, or what a status shows.
+        """Take goals off the record that are over, or that a status shows.
 
-        What was looked for to no avail is to be told once; should its server only have stood still,
-        and be in sight another time, it is awaited again.
+        A goal that was looked for in vain is told once. Should its server only have stood still,
+        and be in sight another time, the goal is awaited again.
         """
         was_looked_for = time.monotonic() >= self._deadline
         for goal_id, sent in self._sent.items():
@@ -214,7 +219,10 @@ class Cleanup:
         ]
 
     def _required(self) -> set[RollCall]:
-        """Return the actions whose servers are to tell what they run; others are not asked."""
+        """Return the actions whose servers are to tell their goals.
+
+        The servers of others are not asked.
+        """
         if self.wanted is None:
             return set(self._calls.values())
         return {left.call for left in self._left.values()} | self._wanted
@@ -227,9 +235,9 @@ class Cleanup:
         )
 
     def _turn(self, still: Stalls) -> None:
-        """Take all that has come in, then look around, and ask."""
+        """Take arrived messages, then look around, and ask."""
         for call, view in self._views.items():
-            self._hear(call, view)  # first: what was told before an answer is read
+            self._hear(call, view)  # first: a status from before an answer is read after it
             for message in view.statuses():
                 self._read(call, message)
                 still.lives(time.monotonic())  # there may be many, each of thousands of goals
@@ -241,7 +249,7 @@ class Cleanup:
             call.sees(view.servers(), now)
         self._find()
         for call in self._required() & self._views.keys():
-            # of a goal that is nobody's: any answer shows that a server lives
+            # about a goal that nobody has: any answer shows that a server lives
             view, due = self._views[call], not call.known and call.due(now)
             if due and (question := view.cancel(uuid.uuid4().bytes)) is not None:
                 call.asked(question, now)
@@ -260,7 +268,7 @@ class Cleanup:
 
     def _read(self, call: RollCall, message: Any) -> None:
         call.tells()
-        one_server = len(call.servers) <= 1  # or else another may run what has ended
+        one_server = len(call.servers) <= 1  # a second server may run an ended goal
         for entry in message.status_list:
             goal_id, ended = bytes(entry.goal_info.goal_id.uuid), entry.status in ENDS
             left = self._left.get(goal_id)
@@ -277,7 +285,7 @@ class Cleanup:
                     self._elsewhere[goal_id] = call.action
 
     def _find(self) -> None:
-        """See who of those that left goals is dead by now: a status comes at a change only."""
+        """Find the goals of authors that are dead by now: a status comes at a change only."""
         alive = {author: author.alive for author in {by for _, by in self._of_others.values()}}
         for goal_id, (call, author) in list(self._of_others.items()):
             if not alive[author]:
@@ -298,7 +306,7 @@ class Cleanup:
         self.found(left)
 
     def _read_records(self) -> None:
-        """Read what those have on record that have died since."""
+        """Read the records of processes that have died since the last turn."""
         self._trouble = None
         for sent in left_behind(self._read_before):
             if isinstance(sent, OSError):
@@ -311,7 +319,7 @@ class Cleanup:
                 self._sent[sent.goal_id] = sent
             else:
                 self._elsewhere[sent.goal_id] = sent.action
-        if self._trouble is not None and self._trouble.filename:  # to be told again
+        if self._trouble is not None and self._trouble.filename:  # to be read and told again
             self._read_before.discard(Path(self._trouble.filename))
 
     def _turns_up(self, left: LeftBehind) -> None:
@@ -322,7 +330,7 @@ class Cleanup:
                 self.found(left)
 
     def _cancel(self, now: float) -> None:
-        """Ask the servers to cancel what has not ended, again every second."""
+        """Ask the servers to cancel goals that have not ended, again every second."""
         asked = Counter[RollCall]()
         for left in sorted(self._left.values(), key=lambda goal: goal.asked_at):
             call = left.call
