@@ -22,44 +22,43 @@ HEAD = """\
 
 <!-- Made by scripts/goal_doc.py from TABLE in bt_actions/goals/table.py. Do not edit. -->
 
-One goal on one action server, from wish to end. What happens is told to `Goal.on` as an event, each
-deadline that has passed (`Goal.due`) as well; what to do comes back as commands. Every pair of
-state and event is decided. What is not in these tables came too late, or twice, to mean anything,
-and is dropped.
+One goal on one action server, from wish to end. `Goal.on` takes each event, also each deadline that
+has passed (`Goal.due`), and returns commands. Every pair of state and event is decided. An event
+that is not in these tables came too late, or twice, to mean anything, and is dropped.
 
-As a rule it is QUEUED, WAITING_FOR_SERVER, SENDING, EXECUTING and DONE, with CANCELING before the
-end where it is not wanted any more. The other states are for what goes wrong: a request without an
-answer, a server that is lost. A leaf is free as soon as its outcome is decided, and some goals live
-on after that, so that they are canceled should they run all the same.
+As a rule a goal is QUEUED, WAITING_FOR_SERVER, SENDING, EXECUTING and DONE; an unwanted goal is
+CANCELING before its end. The other states are for faults: a request without an answer, a server
+that is lost. A leaf is free as soon as its outcome is decided. Some goals live on after that, so
+that they are canceled should they run all the same.
 
-`--json` and the terminal tell less finely: REPLACED is shown as EXECUTING there, and UNWANTED,
-UNCONFIRMED, PRESUMED_NOT_RECEIVED, NOT_RECEIVED and LOST as CANCELING.
+`--json` and the terminal show fewer states: REPLACED as EXECUTING, and UNWANTED, UNCONFIRMED,
+PRESUMED_NOT_RECEIVED, NOT_RECEIVED and LOST as CANCELING.
 """
 OUTCOMES = {
     Outcome.SUCCEEDED: "the server succeeded, and `expect` holds",
     Outcome.UNEXPECTED_RESULT: "the server succeeded, but `expect` does not hold",
     Outcome.REJECTED: "the server refused the goal",
     Outcome.ABORTED: "the server gave up; its result is kept",
-    Outcome.CANCELED: "this process stopped it, or replaced it, whatever status it ended with",
-    Outcome.CANCELED_BY_OTHER: "it ended as canceled, and this process had not asked for it",
+    Outcome.CANCELED: "this process stopped or replaced the goal, whatever its status at the end",
+    Outcome.CANCELED_BY_OTHER: "the goal ended as canceled, and this process had not asked for it",
     Outcome.SERVER_UNAVAILABLE: "no server within `timeout.server`",
     Outcome.SERVER_AMBIGUOUS: "two live servers under the name: not sent, or canceled at both; a "
-    "process sends no goal in its first second, in which it may see one of them only",
+    "process sends no goal in its first second, in which it may see only one server",
     Outcome.SERVER_BUSY: "the resource was not free within `timeout.queue`, or `busy: fail`",
-    Outcome.ACCEPT_TIMEOUT: "no answer within `timeout.accept`; it may have been executed",
+    Outcome.ACCEPT_TIMEOUT: "no answer within `timeout.accept`; the goal may have been executed",
     Outcome.RESULT_TIMEOUT: "not finished within `timeout.result`, and canceled",
     Outcome.STALLED: "no feedback for `timeout.feedback`, and canceled",
     Outcome.SERVER_LOST: "the server died or was restarted under the goal",
     Outcome.INVALID_GOAL: "the message could not be built; nothing was sent",
 }
 ENDS = """\
-How a goal stands on its server is its *end*: SUCCEEDED, ABORTED or CANCELED as the server said,
-NEVER_STARTED where nothing was begun, SERVER_GONE where the server went away with it, and UNKNOWN,
-which is logged, is in the report, and makes the exit code 3.
+A goal's *end* is its standing on its server: SUCCEEDED, ABORTED or CANCELED in the server's words,
+NEVER_STARTED where nothing was begun, SERVER_GONE where the server went away with the goal, and
+UNKNOWN. An UNKNOWN end is logged, stands in the report, and makes the exit code 3.
 
-Whatever `retry.outcomes` names, nothing is tried again beside a goal whose end is UNKNOWN; nor
-where it is SERVER_GONE, unless SERVER_LOST is named; nor what has SUCCEEDED, but for
-UNEXPECTED_RESULT.
+`retry.outcomes` has limits: no attempt begins beside a goal whose end is UNKNOWN. After SERVER_GONE
+one begins only if SERVER_LOST is named. A goal that has SUCCEEDED is tried again for
+UNEXPECTED_RESULT alone.
 """
 
 

@@ -14,24 +14,24 @@ from bt_actions.goals.terms import CANCEL_ACCEPTED, CANCEL_UNKNOWN_GOAL
 ASK_AGAIN = 1.0
 """Seconds between two questions to a server that owes an answer."""
 ASK_LESS = 10.0
-"""The same, after `UNHEARD` questions without a word: they wait in the queue of a server that is
-busy, which holds ten, those of other clients among them."""
+"""The same, after `UNHEARD` questions without a word: questions wait in the queue of a busy
+server, which holds ten, those of other clients among them."""
 UNHEARD = 3
 ASK_IN_ANY_CASE = 30.0
-"""Seconds between two questions to a server that need not have an answer yet: should the result
-and the status both be lost, a goal without deadlines would wait for ever."""
+"""Seconds between two questions to a server that need not have an answer yet: without them, a
+goal without deadlines would wait for ever for a result and a status that are both lost."""
 RESULT_QUESTIONS = 40
-"""So many questions for the result of a goal that has ended, until it counts as lost. On a link
-that loses a fifth, the middleware repairs half of what is lost every 3 s; 21 s were measured."""
+"""Questions for the result of a goal that has ended, until the result counts as lost. On a link
+that loses a fifth, the middleware repairs half of the losses every 3 s; 21 s were measured."""
 DOUBTS = 3
-"""So many times a lone server may deny a goal that it had accepted before it is believed."""
+"""Denials of a goal that a lone server had accepted, until one is believed."""
 DENIED_FOR_GOOD = 30.0
-"""Seconds for which a server must have denied a request that it never answered, until the end of
-the tree need not wait for it. Should it turn up all the same, it is canceled."""
+"""Seconds of denials of a request without any other answer, until the end of the tree need not
+wait. Should the goal turn up all the same, the server is asked to cancel it."""
 
 LOOKED_OUT_FOR = 3.0
 """Seconds for which a run that is over, or a leaf that is shut down, looks out for a server that
-went away: one that was only stopped still runs its goal."""
+went away: a server that was only stopped still runs its goal."""
 
 
 @dataclass(slots=True)
@@ -39,14 +39,14 @@ class Asking:
     """The requests to cancel one goal, which also ask whether the server has it."""
 
     unheard: int = 0
-    """Requests since anything was heard of the goal."""
+    """Requests since the last word of the goal."""
     asked_at: float | None = None
     answer: int | None = None
     """The last answer, a code of action_msgs/srv/CancelGoal."""
     denied_since: float = math.inf
-    """Every answer since then was: unknown goal."""
+    """The moment since which every answer was: unknown goal."""
     in_vain: bool = False
-    """The end of its tree waited for it in vain; none does again, until its server is back."""
+    """Whether the end of the tree waited in vain; nobody waits again until the server is back."""
     _denied_at: float = 0.0
 
     def ask(self, now: float) -> float:
@@ -55,7 +55,7 @@ class Asking:
         return ASK_AGAIN if self.unheard <= UNHEARD else ASK_LESS
 
     def hear(self) -> bool:
-        """Take note of any word of the goal; return whether it breaks a long silence."""
+        """Take note of any word of the goal; return whether a long silence ends."""
         silent, self.unheard = self.unheard > UNHEARD, 0
         return silent
 
@@ -69,15 +69,18 @@ class Asking:
         self._denied_at, self.denied_since = now, min(now, self.denied_since)
 
     def denied_lately(self, now: float) -> bool:
-        """Return whether the last answer was a denial, and is not old."""
+        """Return whether the last answer was a denial, and is recent."""
         return self.denied_since < math.inf and now - self._denied_at <= 2 * ASK_AGAIN
 
     def left_to_deny(self, now: float) -> float:
-        """Return the seconds for which it must still be denied until that is believed for good."""
+        """Return the missing seconds of denials until a denial is believed for good."""
         return min(now, self.denied_since) + DENIED_FOR_GOOD - now
 
     def begin_anew(self, now: float) -> None:
-        """Ask whoever has the goal again; of all answers, only a late denial still counts."""
+        """Begin anew with a server that is back.
+
+        Of all answers, only a recent denial still counts.
+        """
         if not self.denied_lately(now):
             self.denied_since = math.inf
         self.unheard, self.answer = 0, None
@@ -85,17 +88,17 @@ class Asking:
 
 @dataclass(slots=True)
 class LostResult:
-    """Whether a goal that seems to have ended owes its result."""
+    """The result that a goal still owes, though it seems to have ended."""
 
     status: int | None = None
-    """Terminal, from the status topic: so it has ended."""
+    """The terminal status, from the status topic: the goal has ended."""
     questions: int = 0
-    """For the result since then."""
+    """Questions for the result since then."""
     denials: int = 0
-    """So often its server has said, in a row, that it does not know the goal."""
+    """Denials of the goal by its server, in a row."""
 
     def asked_in_vain(self) -> bool:
-        """Count a question; return whether there were enough of them."""
+        """Count a question; return whether enough were asked."""
         if self.status is None:
             return False
         self.questions += 1

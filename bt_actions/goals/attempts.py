@@ -1,7 +1,7 @@
-"""How one action is tried until an outcome stands: which attempt this is, and when the next may be.
+"""The attempts of one action until an outcome stands: which is under way, and when the next may be.
 
-Told of every outcome, it keeps the history and answers "again?". No ROS, no thread, no clock of
-its own; it never sends anything and knows nothing of a goal's states (goal.py).
+The object gets every outcome, keeps the history and answers "again?". No ROS, no thread, no clock
+of its own. Nothing here sends anything, or knows a goal's states (goal.py).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class AttemptRecord:
 
     @property
     def end(self) -> End:
-        """How the goal stands on its server, as far as is known by now."""
+        """The end of the goal, as far as is known by now."""
         return self.goal.end
 
     @property
@@ -55,10 +55,10 @@ class AttemptRecord:
 
 
 class Attempts:
-    """The tries of one visit to a leaf."""
+    """The attempts of one visit to a leaf."""
 
     def __init__(self, retry: Retry, when: Callable[[Any], bool] | None) -> None:
-        """Begin a visit; `when` is `retry.when` made callable, and means no where it raises."""
+        """Begin a visit; `when` is `retry.when` made callable, and an error in it means no."""
         self.retry = retry
         self.history: list[AttemptRecord] = []
         self._when = when
@@ -71,7 +71,7 @@ class Attempts:
         return len(self.history) + 1
 
     def again(self, record: AttemptRecord, chance: random.Random) -> bool:
-        """File `record`; return whether there will be another attempt after a pause."""
+        """File `record`; return whether another attempt follows after a pause."""
         self.history.append(record)
         why_not = self._why_not(record) if len(self.history) < self.retry.attempts else ""
         if why_not:
@@ -83,9 +83,11 @@ class Attempts:
         return True
 
     def pause_left(self, now: Now, *, look_only: bool = False) -> float:
-        """Return the seconds until the next attempt may begin; a clock that jumps back waits on.
+        """Return the seconds until the next attempt may begin.
 
-        With `look_only` nothing is noted, so that any thread may ask.
+        The rest stays where the clock jumps back.
+
+        `look_only` changes nothing, so that any thread may ask.
         """
         resume_at = self._resume_at - max(0.0, self._ros_seen - now.ros)
         if not look_only:
@@ -93,7 +95,10 @@ class Attempts:
         return max(0.0, resume_at - now.ros)
 
     def _why_not(self, record: AttemptRecord) -> str | None:
-        """Return why there is no other attempt: "" where that is plain; None where there is one."""
+        """Return the reason against another attempt: "" where that is plain.
+
+        None where one follows.
+        """
         if record.outcome not in self.retry.outcomes:
             known = record.outcome in RETRYABLE
             return f"{record.outcome} is not among the outcomes of retry" if known else ""

@@ -1,8 +1,8 @@
 """The facts of one goal, and the steps of the table, which change them.
 
-Everybody may read the facts. Its steps (goals/steps) write them, by the tools below, which
-are said once where several steps do the same; `Goal.on` writes the state that a step has led to.
-A caller may add to `reason`. A step sends nothing: what is to be done is left in `commands`.
+Every room may read the facts. The goal's steps (goals/steps) write them, through the tools below,
+which hold what several steps do alike. `Goal.on` writes the state that a step has led to. A caller
+may add to `reason`. A step sends nothing, and leaves `commands` to the caller.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from bt_actions.goals.terms import (
 from bt_actions.utilities.shorten import given_fields, shorten
 
 PATIENCE = 5.0
-"""Seconds for an answer that nobody wants any more, where the user gave no deadline."""
+"""Seconds for an answer about an unwanted goal, where the user gave no deadline."""
 FIELDS_SHOWN = 60
 """Characters of a goal's fields in a reason that blames the goal."""
 
 
 class Facts:
-    """One goal as it stands."""
+    """The facts of one goal."""
 
     message: Any = None
-    """The goal message, until its leaf has the outcome: reasons tell of it, and no step depends
-    on it."""
+    """The goal message, until its leaf has the outcome: reasons quote it, and no step depends on
+    it."""
     untold: Collection[str] = ()
-    """Its fields that say who asks, and not for what: no reason tells of them."""
+    """Fields that say who asks, and not for what: no reason quotes them."""
     is_secret = False
-    """Whether no reason, and no event, tells of its fields."""
+    """Whether every reason and every event keeps silent about its fields."""
     _fields_then = ""
 
     def __init__(
@@ -62,30 +62,31 @@ class Facts:
         self.resources = resources or frozenset({server})
         self.busy = busy
         self.accounts_for_all = accounts_for_all
-        """Whether a result (None: a lost one) says that nothing it began still runs."""
+        """Returns whether nothing that the goal began still runs, as its result says (None: a
+        lost result)."""
         self.state = self.last_live = State.QUEUED
-        """Where it is, and where it was before it was LOST or DONE."""
+        """The state; and, for a goal that is LOST or DONE, the state before that."""
         self.planned: Outcome | None = None
-        """The outcome when it has ended, of a goal that is not wanted any more."""
+        """The outcome that an unwanted goal will have when it has ended."""
         self.outcome: Outcome | None = None
         self.reason = ""
         self.end = End.NEVER_STARTED
         self.result: Any = None
         self.feedback: Any = None
         self.claims_resources = True
-        """Whether it has its resources, or a place in the queue for them."""
+        """Whether the goal has its resources, or a place in the queue for them."""
         self.asking = Asking()
         self.lost_result = LostResult()
         self.deadlines = Deadlines(now)
         self.deadlines.arm(Event.QUEUE_DUE, timeouts.queue)
         self.commands: list[Command] = []
-        """Of the step that is being made."""
+        """The commands of the present step."""
         self.detail: Any = None
-        """The detail of the event that is being told."""
+        """The detail of the present event."""
 
     @property
     def phase(self) -> State:
-        """Where it is, or was when its server could last be asked."""
+        """The state, or for a LOST or DONE goal the last one in which its server could be asked."""
         return self.last_live if self.state in (State.LOST, State.DONE) else self.state
 
     @property
@@ -100,26 +101,26 @@ class Facts:
 
     @property
     def may_still_be_accepted(self) -> bool:
-        """Whether the request may still be accepted, though nobody wants it any more.
+        """Whether an unwanted request may still be accepted.
 
-        Also where its server denies it by now: the tree goes on, but must not end without asking
-        again.
+        True also while the server denies the goal: the tree goes on, but must ask again before it
+        ends.
         """
         return self.state in MAY_STILL_BE_ACCEPTED
 
     @property
     def patience(self) -> float:
-        """Seconds for the server to answer what it is asked of a goal that it did not accept."""
+        """Seconds for the server to answer about a goal that it did not accept."""
         return self.timeouts.accept or self.timeouts.cancel or PATIENCE
 
     @property
     def steady(self) -> float:
-        """Seconds of the steady clock, as of the last moment that was told."""
+        """The steady clock at the last moment that was told, in seconds."""
         return self.deadlines.now.steady
 
     @property
     def cancel_said(self) -> str:
-        """The server's answer to the request to cancel it, to follow a reason; or ""."""
+        """The server's answer to the request to cancel the goal, to follow a reason; or ""."""
         gone = self.state is State.LOST and self.end is not End.UNKNOWN  # else only its node is
         if gone or self.asking.asked_at is None or self.state is State.DONE:
             return ""
@@ -138,7 +139,7 @@ class Facts:
         return f"; goal {fields}" if fields else ""
 
     def forget_message(self) -> None:
-        """Keep of the message, which is as large as the user's data, what may still be told."""
+        """Drop the message, which may be large, and keep its fields for later reasons."""
         if self.state is not State.DONE:
             self._fields_then = self.fields
         self.message = None
@@ -147,7 +148,7 @@ class Facts:
     def fields(self) -> str:
         """The fields that the goal message gives, in short: ``{distance: 12.0}``; or "".
 
-        Of a goal that is a secret nothing is said.
+        The fields of a secret goal are "".
         """
         if self.is_secret:
             return ""
@@ -155,7 +156,7 @@ class Facts:
             return self._fields_then
         given = given_fields(self.message)
         asks = {name: given[name] for name in given if name not in self.untold}
-        told = asks or self.message  # one that gives none is told whole
+        told = asks or self.message  # a message that gives no field is told whole
         text = shorten(told, FIELDS_SHOWN) if told else ""
         return f"{text}}}" if text.endswith("…") else text
 
@@ -169,7 +170,7 @@ class Facts:
         )
 
     def plan(self, outcome: Outcome, reason: str) -> None:
-        """Let it have this outcome when it has ended, unless that is decided."""
+        """Plan the outcome that the goal has when it has ended, unless the outcome is decided."""
         if self.outcome is None:
             self.planned, self.reason = outcome, reason
 
@@ -179,21 +180,21 @@ class Facts:
             self.outcome, self.reason = outcome, reason
 
     def settle_as_planned(self, otherwise: Outcome = Outcome.CANCELED, reason: str = "") -> None:
-        """Decide the outcome: the one that was planned, if there is one."""
+        """Decide the outcome: the planned one, if there is one."""
         if self.planned is None:
             self.settle(otherwise, reason)
         else:
             self.settle(self.planned, self.reason)
 
     def take_result(self) -> int:
-        """Keep the result, and note how it ended; return the status."""
+        """Keep the result and the end; return the status."""
         status: int
         status, self.result = self.detail
         self.end = ENDS[status] if self.accounts_for_all(self.result) else End.UNKNOWN
         return status
 
     def end_by_status(self) -> State:
-        """Believe the status, if one has shown the end; nothing more is asked."""
+        """Believe the status, if one has shown the end; no further question follows."""
         if self.lost_result.status is not None:
             self.end = ended = ENDS[self.lost_result.status]
             if ended is End.ABORTED and not self.accounts_for_all(None):
@@ -210,7 +211,7 @@ class Facts:
             self.commands.append(Command.RELEASE)
 
     def ask(self) -> None:
-        """Ask to cancel and, where there will be one, for the result; again in a while."""
+        """Ask to cancel and, of an accepted goal, for the result; ask again in a while."""
         self.commands.append(Command.CANCEL)
         if self.accepted:
             self.commands.append(Command.ASK_RESULT)
@@ -218,27 +219,27 @@ class Facts:
 
 
 Does = Callable[[Facts], State | None]
-"""Changes the goal; returns the next state, if it is another one."""
+"""Changes the goal; returns the next state, if the state changes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One decision: what is done, in words too, and which states may follow."""
+    """One decision: the work, also in words, and the states that may follow."""
 
     does: Does
     to: frozenset[State]
-    """Beside the state in which it is made."""
+    """States that may follow, beside the state in which the step is made."""
     says: str
 
     def __call__(self, goal: Facts) -> State:
-        """Make it; return the state that follows."""
+        """Make the step; return the state that follows."""
         return self.does(goal) or goal.state
 
 
 def leads_to(*to: State) -> Callable[[Does], Step]:
-    """Make a function a step, which leads to one of these states or stays where it is.
+    """Make a function a step, which leads to one of these states or stays in its own.
 
-    docs/goal.md has the first line of the function's docstring.
+    docs/goal.md quotes the first line of the function's docstring.
     """
 
     def step(does: Does) -> Step:
@@ -250,4 +251,4 @@ def leads_to(*to: State) -> Callable[[Does], Step]:
 
 @leads_to()
 def drop(goal: Facts) -> None:
-    """Drop it: it came too late, or twice, to mean anything."""
+    """Drop the event: it came too late, or twice, to mean anything."""

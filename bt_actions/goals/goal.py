@@ -1,17 +1,17 @@
 """One goal on one action server, from wish to end.
 
-The rules this lives by:
-- No ROS, no thread, no clock of its own: a method is told what happened and when, and returns
-  what to do (`Command`). The caller carries it out, in order, but may have a cancel wait for its
-  turn, and tells what came of it.
+The rules of this machine:
+- No ROS, no thread, no clock of its own: a method gets an event and its moment, and returns the
+  commands (`Command`). The caller carries them out, in order, but may have a cancel wait for its
+  turn, and reports the results as events.
 - Every pair of state and event is decided in one table (table.py, docs/goal.md), by a step
-  (steps/) that changes what is known of the goal (facts.py).
+  (steps/) that changes the facts of the goal (facts.py).
 - An outcome is decided once. An end that is UNKNOWN may still become known.
-- After what comes with DONE nothing is sent.
+- After the commands that come with DONE nothing is sent.
 
-A leaf is free as soon as `outcome` is set. The goal itself may live on until it is DONE: somebody
-(traffic/driver.py) keeps feeding it events. Whether to try again is decided in attempts.py, who
-may have a resource in resources.py.
+A leaf is free as soon as `outcome` is set. The goal itself may live on until it is DONE: a caller
+(traffic/driver.py) keeps telling it events. attempts.py decides whether to try again, resources.py
+which goal holds a resource.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ class Goal(Facts):
         told = "" if self.outcome is None else f" {self.outcome}, end {self.end}"
         return f"<Goal {self.server} {self.id.hex()} {self.state.name}{told}>"
 
-    # What the caller may tell
+    # The caller's reports
 
     def turns_up_again(self) -> None:
-        """Be one that has ended, and that a second server runs; made for that.
+        """Make a new goal stand for an ended one that a second server runs.
 
-        It counts as lost, and is canceled at SERVER_RETURNED.
+        The goal counts as lost, and is canceled at SERVER_RETURNED.
         """
         self.deadlines.clear()
         self.claims_resources, self.end = False, End.SERVER_GONE
@@ -60,10 +60,11 @@ class Goal(Facts):
         self.settle(Outcome.SERVER_AMBIGUOUS, "a second server took it, too, when it had ended")
 
     def on(self, event: Event, now: Now, detail: Any = None) -> tuple[Command, ...]:
-        """Take what happened and return what to do, in order.
+        """Take an event and return the commands, in order.
 
-        What only an accepted goal has shows that its acceptance was lost, or overtaken; and of one
-        that went out of sight with its server, that it is back.
+        Some events come to accepted goals only. For a goal without an acceptance such an event
+        shows that the acceptance was lost, or overtaken. For a goal that was lost with its server
+        it shows that the server is back.
         """
         # An answer shows no more than the acceptance, which of some LOST goals is known already
         denied = event is Event.CANCEL_ANSWERED and (self.accepted or detail == CANCEL_UNKNOWN_GOAL)
@@ -72,7 +73,7 @@ class Goal(Facts):
         self.deadlines.follow(now)
         is_over = self.state in (State.LOST, State.DONE)
         if event in FROM_SERVER and self.asking.hear() and not is_over:
-            self.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)  # it can be asked again
+            self.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)  # the server can be asked again
         step, previous = TABLE[self.state, event], self.state
         self.detail = detail
         state = step(self)
@@ -94,10 +95,10 @@ class Goal(Facts):
             if self.deadlines.take_passed(event, now):
                 yield event
 
-    # What the caller may ask
+    # The caller's questions
 
     def due_in(self, now: Now) -> float | None:
-        """Return the seconds until the earliest deadline (0 when it has passed), or None."""
+        """Return the seconds until the earliest deadline (0 when one has passed), or None."""
         waits = self.deadlines.left(now)
         return max(0.0, waits[0][0]) if waits else None
 
@@ -110,41 +111,41 @@ class Goal(Facts):
 
     @property
     def lost(self) -> bool:
-        """Whether its server went away, or who sent it has left."""
+        """Whether the goal's server went away, or its sender has left."""
         return self.state is State.LOST
 
     @property
     def late(self) -> bool:
-        """Whether it succeeded, or was refused, when a deadline had passed."""
+        """Whether the goal succeeded, or was refused, when a deadline had passed."""
         deadline_passed = self.planned not in (None, *NEVER_DONE)
         came = self.end is End.SUCCEEDED or self.outcome is Outcome.REJECTED
         return deadline_passed and came
 
     @property
     def request_pending(self) -> bool:
-        """Whether its request has no answer yet, and `timeout.accept` has not passed."""
+        """Whether the request has no answer yet, and `timeout.accept` has not passed."""
         return self.state in (State.SENDING, State.UNWANTED)
 
     @property
     def in_flight(self) -> bool:
-        """Whether its request may lie in its server's queue."""
+        """Whether the request may lie in its server's queue."""
         may_come = self.state is State.SENDING or self.may_still_be_accepted
         return may_come and self.asking.denied_since == math.inf
 
     @property
     def outstanding(self) -> bool:
-        """Whether a server that has it must be rid of it before it gets another goal."""
+        """Whether a server with this goal must be rid of it before the next goal is sent."""
         unknown = not self.claims_resources and self.end is End.UNKNOWN and self.sent
         return unknown and (self.accepted or not self.asking.in_vain)
 
     @property
     def exclusive(self) -> frozenset[str]:
-        """The resources that no other goal may use beside it, on whichever server."""
+        """The resources that no other goal may use beside this one, on whichever server."""
         return self.resources if self.busy in (Busy.WAIT, Busy.FAIL) else frozenset()
 
     @property
     def drains_within(self) -> float:
-        """Seconds from the wish to cancel until the end is known, or will not be for long."""
+        """Seconds from the wish to cancel until the end is known, or will stay unknown for long."""
         cancel = PATIENCE if self.timeouts.cancel is None else self.timeouts.cancel
         if self.accepted:
             return cancel

@@ -1,7 +1,7 @@
-"""How long to wait, how often to try, on what, and what to do when the server is taken.
+"""The wishes of a user: how long to wait, how often to try, and what to do about a taken resource.
 
-Values only: frozen, checked when made, compared by content. No ROS, no clock, no behaviour;
-nothing here decides what happens to a goal (table.py, steps/), or when to try again (attempts.py).
+Values only: frozen, checked when made, compared by content. No ROS, no clock, no behaviour. Nothing
+here decides the course of a goal (table.py, steps/), or another attempt (attempts.py).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 
 class Outcome(StrEnum):
-    """Why a leaf stopped."""
+    """The reason why a leaf stopped."""
 
     SUCCEEDED = "SUCCEEDED"
     """The server succeeded, and ``expect`` holds."""
@@ -26,22 +26,23 @@ class Outcome(StrEnum):
     ABORTED = "ABORTED"
     """The server gave up; its result is kept."""
     CANCELED = "CANCELED"
-    """This process stopped it, whatever status it ended with."""
+    """This process stopped the goal, whatever status it ended with."""
     CANCELED_BY_OTHER = "CANCELED_BY_OTHER"
-    """Ended as canceled, and this process had not asked for it."""
+    """The goal ended as canceled, and this process had not asked for that."""
     SERVER_UNAVAILABLE = "SERVER_UNAVAILABLE"
     """No server within ``Timeouts.server``."""
     SERVER_AMBIGUOUS = "SERVER_AMBIGUOUS"
     """Two live servers under the name: a goal would be, or may be, executed twice.
 
-    A process that has just begun may see one of them first: it sends no goal in its first second.
+    A new process may see one of them first, and so sends no goal in its first second.
     """
     SERVER_BUSY = "SERVER_BUSY"
     """The resource was not free within ``Timeouts.queue``."""
     ACCEPT_TIMEOUT = "ACCEPT_TIMEOUT"
-    """The goal request was not answered within ``Timeouts.accept``; it may have been executed."""
+    """The goal request was not answered within ``Timeouts.accept``; the goal may have been
+    executed."""
     RESULT_TIMEOUT = "RESULT_TIMEOUT"
-    """Not finished within ``Timeouts.result``."""
+    """The goal was not finished within ``Timeouts.result``."""
     STALLED = "STALLED"
     """No feedback for ``Timeouts.feedback``."""
     SERVER_LOST = "SERVER_LOST"
@@ -51,18 +52,19 @@ class Outcome(StrEnum):
 
 
 class End(StrEnum):
-    """How a goal stands on its server."""
+    """The standing of a goal on its server."""
 
     SUCCEEDED = "SUCCEEDED"
-    """The server said so, as for the next two."""
+    """The word of the server, as are the next two."""
     ABORTED = "ABORTED"
     CANCELED = "CANCELED"
     NEVER_STARTED = "NEVER_STARTED"
-    """Not sent, refused, or denied by its server; within 30 s of that, it may still turn up."""
+    """The goal was not sent, or refused, or denied by its server; within 30 s of a denial it may
+    turn up."""
     SERVER_GONE = "SERVER_GONE"
-    """The server went away with it; should it come back, the goal is canceled first."""
+    """The server went away with the goal; should it come back, the goal is canceled first."""
     UNKNOWN = "UNKNOWN"
-    """It may still be running."""
+    """The goal may still be running."""
 
 
 class Busy(StrEnum):
@@ -73,13 +75,13 @@ class Busy(StrEnum):
         raise ValueError(f"busy must be one of {', '.join(cls)}, not {value!r}")
 
     WAIT = "wait"
-    """Queue for it, first come first served."""
+    """Queue for the resource, first come first served."""
     REPLACE = "replace"
-    """Send at once, or when an older goal's request is answered; that goal must end."""
+    """Send at once, or when an older goal's request is answered; the older goal must end."""
     FAIL = "fail"
     """Give up at once with SERVER_BUSY."""
     SHARE = "share"
-    """Send at once, beside the others."""
+    """Send at once, beside the other goals."""
 
 
 RETRIED_BY_DEFAULT = frozenset(
@@ -94,7 +96,8 @@ RETRIED_BY_DEFAULT = frozenset(
     }
 )
 RETRIED_IF_NAMED = frozenset({Outcome.ACCEPT_TIMEOUT, Outcome.SERVER_LOST})
-"""The goal may have been executed, in part or whole: trying again is the user's decision."""
+"""Outcomes after which the goal may have been executed, in part or whole: another attempt is the
+user's decision."""
 RETRYABLE = RETRIED_BY_DEFAULT | RETRIED_IF_NAMED
 
 
@@ -144,15 +147,16 @@ class Timeouts:
 
 @dataclass(frozen=True, slots=True)
 class Retry:
-    """How often an action is tried, and after which outcomes.
+    """The number of attempts of an action, and the outcomes that allow another.
 
-    `attempts` counts all tries. The pause after try n is
-    ``min(backoff * factor ** (n - 1), max_backoff)`` seconds, varied by up to ``jitter`` times
-    itself in both directions. `when` is asked with the result of an attempt that has one (a
-    callable, or an expression over ``result``); without it every outcome in `outcomes` is retried.
+    `attempts` counts all tries. The pause after try n is ``min(backoff * factor ** (n - 1),
+    max_backoff)`` seconds, varied by up to ``jitter`` times itself in both directions. `when` is
+    asked with the result of an attempt that has one (a callable, or an expression over ``result``);
+    without `when` every outcome in `outcomes` is retried.
 
-    Whatever is in `outcomes`: nothing is tried again beside a goal whose end is UNKNOWN, nor,
-    unless SERVER_LOST is among them, SERVER_GONE; what has SUCCEEDED, only for UNEXPECTED_RESULT.
+    `outcomes` has limits: no attempt begins beside a goal whose end is UNKNOWN, nor, unless
+    SERVER_LOST is among them, SERVER_GONE; a goal that has SUCCEEDED is tried again only for
+    UNEXPECTED_RESULT.
 
     Raises ValueError when a field is out of its range, or an outcome can never be retried.
     """

@@ -1,8 +1,8 @@
 """The holders of resources, and the queue for them.
 
 A resource is a name ("/r1/move_robot", "base"). A holder asks for a set of names at once and gets
-all of them or none, so that two holders can never wait for each other. No ROS, no thread, no
-clock: the caller locks, and gives up on behalf of a holder whose deadline passed (`release`).
+all of them or none, so that two holders can never wait for each other. No ROS, no thread, no clock:
+the caller locks, and gives up for a holder whose deadline has passed (`release`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,10 @@ class Resources(Generic[Holder]):
         self._queue: dict[Holder, frozenset[str]] = {}
 
     def request(self, holder: Holder, names: frozenset[str], busy: Busy) -> Event | None:
-        """Ask, once, for all of `names`; return GRANTED or TAKEN, or None where it has to wait."""
+        """Ask, once, for all of `names`.
+
+        Return GRANTED or TAKEN, or None where the holder has to wait.
+        """
         taken = self.holders(names) or any(names & wanted for wanted in self._queue.values())
         if busy in (Busy.REPLACE, Busy.SHARE) or not taken:
             self._held[holder] = names
@@ -35,7 +38,10 @@ class Resources(Generic[Holder]):
         return None
 
     def release(self, holder: Holder) -> list[Holder]:
-        """Take `holder` out of the table or the queue; return who is granted thereby, in order."""
+        """Take `holder` out of the table or the queue.
+
+        Return the holders that are granted thereby.
+        """
         self._queue.pop(holder, None)
         self._held.pop(holder, None)
         granted = []
@@ -46,13 +52,13 @@ class Resources(Generic[Holder]):
                 self._held[waiting] = names
                 granted.append(waiting)
             else:
-                passed |= names  # nobody overtakes on a name that an earlier one waits for
+                passed |= names  # no holder overtakes an earlier one on its names
         return granted
 
     def holders(self, names: frozenset[str]) -> list[Holder]:
-        """Return who holds any of `names`, the oldest first."""
+        """Return the holders of any of `names`, the oldest first."""
         return [holder for holder, held in self._held.items() if held & names]
 
     def __len__(self) -> int:
-        """Count holders and waiters together."""
+        """Return the number of holders and waiters together."""
         return len(self._held) + len(self._queue)

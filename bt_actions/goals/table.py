@@ -1,7 +1,7 @@
-"""The table: what is done for every state of a goal and every event, and which states may follow.
+"""The table: the step for every state of a goal and every event, and the states that may follow.
 
-docs/goal.md is made from it. What a step does is in steps/, what a state or an event means in
-terms.py.
+docs/goal.md is made from the table. steps/ has the work of a step, terms.py the meaning of a state
+or an event.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from bt_actions.goals.terms import ACCEPTED, MAY_STILL_BE_ACCEPTED, Event, State
 TABLE: dict[tuple[State, Event], Step] = {
     (state, event): drop for state in State for event in Event
 }
-"""Every pair is decided; what is not decided below is dropped."""
+"""Every pair is decided; a pair that is not decided below is dropped."""
 
 _TWO = "two action servers answer to {server}, and both may have it"
 
@@ -131,7 +131,7 @@ _in(  # a denial: by any other answer `Goal.on` has made it accepted first
     State.PRESUMED_NOT_RECEIVED, CANCEL_ANSWERED=requested.denied_again
 )
 
-# Who is there to ask
+# The server comes, goes, or changes
 _in(*ACCEPTED, *MAY_STILL_BE_ACCEPTED, SERVER_CHANGED=canceling.ask_another)
 _in(
     State.SENDING,

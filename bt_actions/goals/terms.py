@@ -1,6 +1,6 @@
-"""The words in which a goal's life is told: its states, what can happen to it, what it commands.
+"""The terms of a goal's life: its states, its events, its commands.
 
-Values only; what follows from what is decided in table.py.
+Values only; table.py decides what follows from an event.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple
 from bt_actions.goals.policy import End, Outcome
 
 NEVER = float("-inf")
-"""A moment that no moment is before: it has not happened yet."""
+"""A moment before every moment: it has not happened yet."""
 
 
 class Now(NamedTuple):
@@ -19,38 +19,49 @@ class Now(NamedTuple):
 
     steady: float
     ros: float
-    """The node's clock: stands still and jumps where simulated time does."""
+    """The node's clock, which stands still and jumps where simulated time does."""
 
 
 class State(Enum):
-    """Where a goal is in its life."""
+    """The state of a goal in its life."""
 
     __hash__ = object.__hash__  # Enum has one in Python, which is asked often
 
-    QUEUED = "It waits for its resources."
-    WAITING_FOR_SERVER = "It holds its resources, and waits for a server to send to."
+    QUEUED = "The goal waits for its resources."
+    WAITING_FOR_SERVER = "The goal holds its resources, and waits for its server."
     SENDING = "The request is out, and not answered."
-    EXECUTING = "The server has accepted it."
-    REPLACED = "A newer goal of ours was accepted in its place: it is given time to end by itself."
-    CANCELING = "The server has accepted it, and it is not wanted any more: its end is awaited."
-    UNWANTED = "Not wanted any more before the request was answered: canceled once accepted."
-    UNCONFIRMED = "The request was not answered in time: the server may have it, and is asked."
+    EXECUTING = "The server has accepted the goal."
+    REPLACED = (
+        "A newer goal of ours was accepted in its place: the goal gets time to end by itself."
+    )
+    CANCELING = (
+        "The server has accepted the goal, and nobody wants it any more: its end is awaited."
+    )
+    UNWANTED = (
+        "Nobody wants the goal any more, and its request is open: it is canceled once accepted."
+    )
+    UNCONFIRMED = (
+        "The request was not answered in time: the server may have the goal, and is asked."
+    )
     PRESUMED_NOT_RECEIVED = (
-        "The server denies it, so the tree goes on; should it turn up, it is canceled."
+        "The server denies the goal, so the tree goes on; should the goal turn up, it is canceled."
     )
-    NOT_RECEIVED = "Denied for so long that nobody waits for it; canceled should it turn up."
+    NOT_RECEIVED = (
+        "The server has denied the goal for so long that nobody waits; should the goal turn up, it "
+        "is canceled."
+    )
     LOST = (
-        "Its server went away, or who sent it has left. The leaf is free; should its server be "
-        "seen again, perhaps by another node of this process, it is canceled first of all."
+        "The goal's server went away, or its sender has left. The leaf is free; should the server "
+        "be seen again, perhaps by another node of this process, the goal is canceled first of all."
     )
-    DONE = "There is nothing left to do for it."
+    DONE = "Nothing is left to do for the goal."
 
     shown: str
-    """The name in ``--json`` and on the terminal, which tell less finely."""
+    """The name in ``--json`` and on the terminal, which tell states more coarsely."""
 
 
 MAY_STILL_BE_ACCEPTED = frozenset({State.UNWANTED, State.UNCONFIRMED, State.PRESUMED_NOT_RECEIVED})
-"""A goal that was sent, is not wanted any more, and may still be accepted."""
+"""The states of a goal that was sent, is not wanted any more, and may still be accepted."""
 ACCEPTED = frozenset({State.EXECUTING, State.REPLACED, State.CANCELING})
 _SHOWN = {
     State.REPLACED: "EXECUTING",
@@ -59,7 +70,7 @@ _SHOWN = {
 for _state in State:
     _state.shown = _SHOWN.get(_state, _state.name)
 MAY_TURN_UP = MAY_STILL_BE_ACCEPTED | {State.SENDING, State.NOT_RECEIVED, State.LOST}
-"""Feedback or a status is news: it was accepted, and runs, or has run."""
+"""The states in which feedback or a status is news: the goal was accepted, and runs, or has run."""
 
 
 class Command(Enum):
@@ -80,7 +91,7 @@ class Event(Enum):
 
     GRANTED = "the resources are ours"
     TAKEN = "the resources are taken, and waiting is not wanted"
-    SERVER_READY = "one live server is there, and nothing speaks against sending"
+    SERVER_READY = "one live server is there, and nothing bars the request"
     SERVER_AMBIGUOUS = "two live servers are there; if it was sent, both may have it"
     INVALID = "the message could not be built"  # reason
     SEND_FAILED = "the request did not leave"  # reason
@@ -89,16 +100,16 @@ class Event(Enum):
     FEEDBACK = "feedback came"  # the message
     STATUS = "the status topic shows the goal"  # GoalStatus number
     RESULT = "the result came"  # (GoalStatus number, message)
-    RESULT_UNKNOWN = "whoever may have the goal does not know it"
+    RESULT_UNKNOWN = "every server that may have the goal denies it"
     CANCEL_ANSWERED = "the server answered a cancel request"  # CancelGoal return code
     SERVER_CHANGED = "another server answers under the name; is the goal still known?"
     SERVER_LOST = "the server died or was restarted"  # reason
-    SERVER_RETURNED = "the server we had lost is back, with whatever it still runs"
+    SERVER_RETURNED = "the lost server is back, with the goals that it still runs"
     INTERRUPTED = "the tree no longer wants it"
     REPLACED = "a newer goal of this process was accepted in its place"  # by which server
-    DRAIN_GAVE_UP = "the end of its tree has waited for it long enough: what is not known stays so"
-    PARKED = "who sent it leaves: it is kept for whoever sees its server next"
-    ABANDONED = "nobody sees to it any more: its node was closed, or newer lost goals crowd it out"
+    DRAIN_GAVE_UP = "the drain has waited for it long enough: an unknown end stays unknown"
+    PARKED = "its sender leaves: the goal is kept for the next node that sees its server"
+    ABANDONED = "no node sees to it any more: its own was closed, or newer lost goals crowd it out"
     QUEUE_DUE = "timeout.queue has passed"
     SERVER_DUE = "timeout.server has passed"
     ACCEPT_DUE = "timeout.accept has passed"
@@ -106,7 +117,7 @@ class Event(Enum):
     FEEDBACK_DUE = "timeout.feedback has passed"
     CANCEL_DUE = "timeout.cancel has passed"
     POLL_DUE = "time to ask the server again"
-    LOOK_OUT_DUE = "a server that went away was looked out for, and is not back: nobody waits now"
+    LOOK_OUT_DUE = "a server that went away is not back in time: nobody waits now"
 
 
 # GoalStatus and CancelGoal as ROS 2 numbers them (action_msgs).
@@ -131,5 +142,5 @@ FROM_SERVER = frozenset(
     }
 )
 SHOWS_ACCEPTANCE = (Event.FEEDBACK, Event.STATUS, Event.CANCEL_ANSWERED)
-"""Only an accepted goal has it; the last one, unless the answer is a denial."""
+"""Events of an accepted goal only; the last one, unless the answer is a denial."""
 ON_ROS_CLOCK = frozenset({Event.RESULT_DUE, Event.FEEDBACK_DUE})

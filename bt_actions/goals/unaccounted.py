@@ -1,4 +1,4 @@
-"""A goal that nobody can account for, in the words in which log, end report and exit tell of it."""
+"""A goal that is not accounted for, in the words of the log, the end report and the exit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bt_actions.goals.policy import Outcome
 
 @dataclass(frozen=True, slots=True)
 class GoalReport:
-    """A goal that nobody can account for: it may still be running."""
+    """A goal that is not accounted for: it may still be running."""
 
     name: str
     server: str
@@ -18,16 +18,16 @@ class GoalReport:
     outcome: Outcome | None
     reason: str
     fields: str = ""
-    """What the goal asks for, in short: ``{distance: 12.0}``."""
+    """The fields of the goal, in short: ``{distance: 12.0}``."""
 
     @property
     def alarm(self) -> str:
-        """All of it as one line of a log, with what to do."""
+        """The report as one line of a log, with the remedy."""
         remedy = f"once this process has ended, `bt-actions cleanup {self.server}` cancels it"
         return f"not accounted for: {self}; {remedy}"
 
     def __str__(self) -> str:
-        """Name the leaf, the server and the goal, and tell what is known of it."""
+        """Name the leaf, the server and the goal, and the reason."""
         asks = f" {self.fields}" if self.fields and self.fields not in self.reason else ""
         why = f": {self.reason}" if self.reason else ""
         return f"{self.name} on {self.server}, goal {self.goal_id}{asks}{why}"

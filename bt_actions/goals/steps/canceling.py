@@ -1,10 +1,10 @@
-"""Steps of a goal that is not wanted any more, or whose server is lost, until it has ended.
+"""Steps of a goal that is not wanted any more, or whose server is lost, until the goal has ended.
 
-The server is asked to cancel it. `timeout.cancel` runs to the end of the goal, not to an answer.
-When it has passed the leaf is free; the questions are repeated all the same.
+The server is asked to cancel the goal. `timeout.cancel` runs to the end of the goal, not to an
+answer. After `timeout.cancel` the leaf is free; the questions are repeated all the same.
 
-A server that is lost may only be out of reach, and still run the goal. So the leaf is free at once,
-and the goal is kept: where its server is seen again, it is canceled first of all.
+A lost server may only be out of reach, and still run the goal. So the leaf is free at once, and the
+goal is kept: where its server is seen again, the goal is canceled first of all.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from bt_actions.goals.steps import requested
 from bt_actions.goals.terms import CANCEL_REJECTED, STATUS_SUCCEEDED, Command, Event, State
 
 NEVER_DONE = (Outcome.CANCELED, Outcome.SERVER_AMBIGUOUS)
-"""Outcomes that a goal was canceled for and that stand, should it succeed all the same."""
+"""Outcomes of an unwanted goal that stand, should it succeed all the same."""
 
 
 def cancel(outcome: Outcome, why: str) -> Step:
-    """Return the step that cancels what runs."""
+    """Return the step that cancels a running goal."""
     return Step(
         lambda goal: stop(goal, outcome, goal.say(why)),
         frozenset({State.CANCELING}),
@@ -31,7 +31,7 @@ def cancel(outcome: Outcome, why: str) -> Step:
 
 
 def stop(goal: Facts, outcome: Outcome, reason: str) -> State:
-    """Cancel what runs."""
+    """Cancel a running goal."""
     goal.plan(outcome, reason)
     goal.deadlines.disarm(Event.RESULT_DUE, Event.FEEDBACK_DUE, Event.CANCEL_DUE)
     goal.deadlines.arm(Event.CANCEL_DUE, goal.timeouts.cancel)
@@ -50,19 +50,22 @@ def interrupted(goal: Facts) -> None:
     asked_at = goal.asking.asked_at
     is_news = goal.outcome is not None or goal.planned is not Outcome.CANCELED
     if is_news and asked_at is not None and goal.steady - asked_at >= ASK_AGAIN:
-        goal.ask()  # now somebody waits for it
+        goal.ask()  # a caller waits for the end now
     _plan_anew(goal, Outcome.CANCELED, "interrupted by the tree")
 
 
 @leads_to()
 def replaced(goal: Facts) -> None:
-    """Decide CANCELED, whatever the goal was canceled for: no attempt may be beside the newer."""
+    """Decide CANCELED, whatever the goal was canceled for.
+
+    No attempt may be beside the newer goal.
+    """
     _plan_anew(goal, Outcome.CANCELED, "replaced by a newer goal")
 
 
 @leads_to()
 def taken_by_two(goal: Facts) -> None:
-    """Cancel, at both; it must not count as done, or be tried again."""
+    """Cancel, at both; the goal must not count as done, or be tried again."""
     _plan_anew(goal, Outcome.SERVER_AMBIGUOUS, "both of two servers may have it")
     goal.ask()
 
@@ -80,7 +83,7 @@ def finished(goal: Facts) -> State:
 
 @leads_to()
 def cancel_answered(goal: Facts) -> None:
-    """Take note of it: what counts is how the goal ends, or how long it is denied."""
+    """Take note of the answer: what counts is the goal's end, or how long the goal is denied."""
     goal.asking.cancel_answered(goal.detail, goal.steady)
 
 
@@ -116,7 +119,7 @@ def drain_gave_up(goal: Facts) -> State:
         return goal.end_by_status()
     goal.settle_as_planned()
     if goal.may_still_be_accepted:
-        goal.end = End.UNKNOWN  # canceled if it turns up all the same
+        goal.end = End.UNKNOWN  # the goal is canceled if it turns up all the same
     return goal.state
 
 
@@ -125,7 +128,7 @@ def server_lost(goal: Facts) -> State:
     """Free the leaf: SERVER_LOST; keep the goal, in case the server is not dead."""
     goal.settle_as_planned(Outcome.SERVER_LOST, str(goal.detail))
     goal.asking.denied_since = math.inf
-    if goal.phase is not State.NOT_RECEIVED:  # what was denied for less may have come since
+    if goal.phase is not State.NOT_RECEIVED:  # a goal that was denied for less may run by now
         goal.end = End.SERVER_GONE
     state = _keep(goal)
     if goal.state is not state is State.LOST and goal.end is End.SERVER_GONE:
@@ -135,7 +138,7 @@ def server_lost(goal: Facts) -> State:
 
 @leads_to(State.LOST, State.DONE)
 def parked(goal: Facts) -> State:
-    """Keep the goal for the next node that sees its server; what is not known stays UNKNOWN."""
+    """Keep the goal for the next node that sees its server; an unknown end stays UNKNOWN."""
     goal.settle_as_planned(Outcome.CANCELED, "its node was closed")
     if goal.may_still_be_accepted:
         goal.end = End.UNKNOWN
@@ -154,15 +157,15 @@ def _keep(goal: Facts) -> State:
 def returned(goal: Facts) -> State:
     """Cancel the goal, which the server may still run."""
     goal.asking.begin_anew(goal.steady)
-    if goal.phase is State.NOT_RECEIVED:  # nor will it; to ask does no harm
+    if goal.phase is State.NOT_RECEIVED:  # still so; to ask does no harm
         goal.commands.append(Command.CANCEL)
         return State.NOT_RECEIVED
     goal.end = End.UNKNOWN
-    goal.asking.in_vain = False  # there is somebody again who can tell
+    goal.asking.in_vain = False  # a server can tell again
     goal.ask()
     if goal.accepted:
         return State.CANCELING
-    if goal.phase is State.PRESUMED_NOT_RECEIVED:  # until it is denied once more
+    if goal.phase is State.PRESUMED_NOT_RECEIVED:  # until the next denial
         return State.PRESUMED_NOT_RECEIVED
     goal.deadlines.arm(Event.ACCEPT_DUE, goal.patience)
     return State.UNCONFIRMED

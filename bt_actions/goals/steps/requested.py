@@ -1,8 +1,8 @@
 """Steps of a goal that was not accepted yet: it waits for resources, for a server, for an answer.
 
-While it is wanted, an answer is waited for. After that the server is asked by canceling, which
-stops the goal as well: it may have it, or get it yet. If the server denies it for long enough, the
-tree need not wait; whenever it turns up, it is canceled.
+An answer to a wanted goal is awaited. An unwanted goal is canceled, which asks the server as well:
+the server may have the goal, or get it yet. If the server denies the goal for long enough, the tree
+need not wait; whenever the goal turns up, it is canceled.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from bt_actions.goals.terms import Command, Event, State
 
 
 def give_up(outcome: Outcome, why: str) -> Step:
-    """Return the step that ends what was not sent."""
+    """Return the step that ends an unsent goal."""
 
     def step(goal: Facts) -> State:
         goal.settle(outcome, goal.say(why))
@@ -37,7 +37,7 @@ def granted(goal: Facts) -> State:
 def send(goal: Facts) -> State:
     """Send the request; until the server says how the goal ended, its end is UNKNOWN."""
     goal.deadlines.disarm(Event.SERVER_DUE)
-    goal.deadlines.suspend(0.0, goal.deadlines.now)  # it was for a server that is out of sight
+    goal.deadlines.suspend(0.0, goal.deadlines.now)  # a grace was for a server out of sight
     goal.deadlines.arm(Event.ACCEPT_DUE, goal.timeouts.accept)
     goal.end = End.UNKNOWN
     goal.commands.append(Command.SEND)
@@ -69,7 +69,7 @@ def rejected(goal: Facts) -> State:
     """Decide REJECTED, or what the goal was canceled for; nothing was started."""
     goal.end = End.NEVER_STARTED
     why = f"{goal.server} refused the goal {goal.fields}".rstrip()
-    if goal.planned is Outcome.ACCEPT_TIMEOUT:  # this is the answer, though late
+    if goal.planned is Outcome.ACCEPT_TIMEOUT:  # the answer, though late
         goal.settle(Outcome.REJECTED, why)
     goal.settle_as_planned(Outcome.REJECTED, why)
     return State.DONE
@@ -82,11 +82,11 @@ def withdraw(outcome: Outcome, why: str) -> Step:
         goal.plan(outcome, goal.say(why))
         if goal.timeouts.accept is None:
             goal.deadlines.arm(Event.ACCEPT_DUE, goal.patience)
-        if outcome is Outcome.SERVER_AMBIGUOUS:  # whoever has it
+        if outcome is Outcome.SERVER_AMBIGUOUS:  # the server that has the goal
             goal.ask()
         return State.UNWANTED
 
-    says = f"It will be {outcome}: canceled as soon as it is accepted"
+    says = f"Plan {outcome}: the goal is canceled as soon as it is accepted"
     return Step(step, frozenset({State.UNWANTED}), says)
 
 
@@ -131,7 +131,7 @@ def _denied_for_long(goal: Facts) -> State:
 def denied_again(goal: Facts) -> State:
     """Let nobody wait for a goal that has been denied for 30 s."""
     goal.asking.cancel_answered(goal.detail, goal.steady)
-    if not goal.asking.in_vain:  # after its server was back, it was UNKNOWN until now
+    if not goal.asking.in_vain:  # UNKNOWN since the server was back
         goal.end = End.NEVER_STARTED
     return _denied_for_long(goal)
 

@@ -1,6 +1,6 @@
-"""Steps of a goal that its server has accepted: feedback, status, result, and what is lost of them.
+"""Steps of a goal that its server has accepted: feedback, status, result, and lost ones of these.
 
-Most of them are the same whether it is still wanted or not.
+Most steps are the same for a wanted and an unwanted goal.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ def still_runs(goal: Facts) -> None:
 
 @leads_to()
 def status(goal: Facts) -> None:
-    """Ask again for the result of a goal that has ended, in case it was lost."""
+    """Ask again for the result of a goal that has ended, in case the result was lost."""
     if goal.detail not in ENDS:
         goal.lost_result = LostResult()
     elif goal.lost_result.status is None:
         goal.lost_result.status = goal.detail
-        goal.deadlines.disarm(Event.FEEDBACK_DUE)  # it is silent because it has ended
+        goal.deadlines.disarm(Event.FEEDBACK_DUE)  # the goal is silent because it has ended
         goal.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)
 
 
@@ -62,7 +62,7 @@ def ask_for_result(goal: Facts) -> State:
 
 @leads_to(State.DONE)
 def finished(goal: Facts) -> State:
-    """SUCCEEDED, ABORTED or CANCELED_BY_OTHER."""
+    """Decide SUCCEEDED, ABORTED or CANCELED_BY_OTHER."""
     ended, why = goal.take_result(), ""
     if ended == STATUS_ABORTED:
         why = f"aborted by {goal.server}{goal.blamed}"
@@ -74,13 +74,13 @@ def finished(goal: Facts) -> State:
 
 @leads_to(State.DONE)
 def denied(goal: Facts) -> State:
-    """Ask again; believed the third time: SERVER_LOST, or what it was canceled for."""
+    """Ask again; believe the third denial: SERVER_LOST, or what the goal was canceled for."""
     goal.lost_result.denials += 1
     if goal.lost_result.denials < DOUBTS:
         goal.deadlines.arm(Event.POLL_DUE, ASK_AGAIN)
         return goal.state
     if goal.lost_result.status is None:
-        goal.commands.append(Command.CANCEL)  # should it run all the same
+        goal.commands.append(Command.CANCEL)  # should the goal run all the same
     if goal.planned is None:
         goal.plan(Outcome.SERVER_LOST, f"{goal.server} no longer knows the goal it accepted")
     return goal.end_by_status()
@@ -88,10 +88,10 @@ def denied(goal: Facts) -> State:
 
 @leads_to(State.REPLACED, State.CANCELING)
 def replaced(goal: Facts) -> State:
-    """Give it timeout.cancel to end by itself; where another server has the newer, cancel."""
+    """Give the goal timeout.cancel to end; where another server has the newer goal, cancel."""
     if goal.detail not in (None, goal.server):
         return canceling.stop(goal, Outcome.CANCELED, f"replaced by a newer goal on {goal.detail}")
-    if goal.state is State.EXECUTING:  # else by a newer one still, which gives it no more time
+    if goal.state is State.EXECUTING:  # a third goal gives it no more time
         goal.plan(Outcome.CANCELED, "replaced by a newer goal")
         goal.deadlines.disarm(Event.RESULT_DUE, Event.FEEDBACK_DUE)
         goal.deadlines.arm(Event.CANCEL_DUE, goal.timeouts.cancel or PATIENCE)
