@@ -1,6 +1,6 @@
 """What the page costs a browser: 5,000 nodes of which 20 change a second, and leaps in a long run.
 
-The browser is Chromium with its chromedriver, headless, as in the tests.
+The browser is Chromium, headless, as in the tests.
 """
 
 from __future__ import annotations
@@ -73,11 +73,14 @@ const { run } = page, at = run.at.bind(run);
 run.at = (t) => { window.paints = true; return at(t); };
 """
 LEAP = """
-const [seconds, done] = arguments, began = performance.now();
-page.seek(seconds);
-const look = () => (page.s.t === page.t ? setTimeout(() => done(performance.now() - began)) : requestAnimationFrame(look));
-requestAnimationFrame(look);
-"""  # noqa: E501
+const began = performance.now();
+page.seek(arguments[0]);
+return new Promise((done) => {
+  const shown = () => setTimeout(() => done(performance.now() - began));
+  const look = () => (page.s.t === page.t ? shown() : requestAnimationFrame(look));
+  requestAnimationFrame(look);
+});
+"""
 
 
 def nodes() -> list[Node]:
@@ -139,7 +142,7 @@ def told(add: Callable[..., None]) -> Iterator[None]:
 def live() -> Figures:
     """A run that goes on, through its recorder, `bt-actions view`, and a browser."""
     stream = Stream(lambda: (time.monotonic(), time.time(), time.time()))
-    with tempfile.TemporaryDirectory() as folder, browser(Path(folder)) as window:
+    with tempfile.TemporaryDirectory() as folder, browser() as window:
         first = Path(folder) / FIRST
         recorder = Recorder(Wish(first=first), print)
         recorder.record(stream, lambda: None)
@@ -148,7 +151,7 @@ def live() -> Figures:
         while not first.exists():
             time.sleep(0.01)
         with _view(first) as address:
-            window.cdp("Page.addScriptToEvaluateOnNewDocument", source=PAINTED)
+            window.page.add_init_script(PAINTED)
             window.open(address, 1440, 900)
             assert window.wait_for("window.page?.shown")
             window.run(f"{COUNT} page.go_tab('log'); page.go_tab('details')")
@@ -179,7 +182,7 @@ def _view(first: Path) -> Iterator[str]:
 
 def leap() -> Figures:
     """From a press to what is seen, anywhere in a run of LONG events."""
-    with tempfile.TemporaryDirectory() as folder, browser(Path(folder)) as window:
+    with tempfile.TemporaryDirectory() as folder, browser() as window:
         first = Path(folder) / FIRST
         number, writer = 0, list[RunWriter]()
 
@@ -201,7 +204,7 @@ def leap() -> Figures:
         assert window.wait_for("window.page?.shown")
         head = window.run("return page.head")
         places = [(count * 0.618 % 1.0) * head for count in range(LEAPS)]
-        return {"ms": median(window.wait(LEAP, place) for place in places)}
+        return {"ms": median(window.run(LEAP, place) for place in places)}
 
 
 def size() -> Figures:

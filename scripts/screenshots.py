@@ -35,7 +35,7 @@ def main() -> int:
     if missing():
         print(f"the pictures of the page stay as they are: {missing()}", file=sys.stderr)
         return 0
-    with tempfile.TemporaryDirectory() as folder, browser(Path(folder)) as window:
+    with tempfile.TemporaryDirectory() as folder, browser() as window:
         _open(window, Path(folder), DEMO, "#node=1")
         first, *others = _moving(window)
         first.save(
@@ -49,7 +49,7 @@ def main() -> int:
         )
         _open(window, Path(folder), NIGHT, "")
         _seen(window).save(IMAGES / "page_failed.webp", quality=80, method=6)
-        window.scheme("dark")
+        window.page.emulate_media(color_scheme="dark")
         _open(window, Path(folder), NIGHT, "#view=graph")
         _seen(window).save(IMAGES / "page_drawing.webp", quality=80, method=6)
     return 0
@@ -67,7 +67,6 @@ def _open(window: Browser, folder: Path, command: str, place: str) -> None:
             capture_output=True,
             check=words[0] == "report",
         )
-    window.open("about:blank")
     window.open(file.as_uri() + place, *SIZE)
     assert window.wait_for("window.page?.shown")
 
@@ -87,10 +86,8 @@ def _seen(window: Browser) -> Image:
     """Return what is seen, once all is painted."""
     from PIL.Image import open as read  # here: a test only reads which pictures there are
 
-    window.wait("const [done] = arguments; requestAnimationFrame(() => setTimeout(done, 100));")
-    with tempfile.NamedTemporaryFile(suffix=".png") as file:
-        window.picture(Path(file.name))
-        return read(io.BytesIO(Path(file.name).read_bytes())).convert("RGB")
+    window.run("return new Promise((d) => requestAnimationFrame(() => setTimeout(d, 100)))")
+    return read(io.BytesIO(window.page.screenshot())).convert("RGB")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The page of a tree as a reader has it: in Chromium, with pointer, keyboard and finger.
 
-Skipped where there is no Chromium with its chromedriver.
+Skipped where there is no Chromium.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ SHOWN = f"!{CARD}.hidden && {CARD}.textContent"
 
 
 @pytest.fixture(scope="module")
-def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
-    with chromium.browser(tmp_path_factory.mktemp("browser")) as opened:
+def window() -> Iterator[chromium.Browser]:
+    with chromium.browser() as opened:
         yield opened
 
 
@@ -37,11 +37,13 @@ def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browse
 def show(window: chromium.Browser, tmp_path: Path) -> Iterator[Open]:
     """Show a tree; when the test is over the browser must have had nothing to complain about."""
 
-    def shown(root: Behaviour, scheme: str = "light", width: int = 1200) -> chromium.Browser:
+    def shown(
+        root: Behaviour, scheme: chromium.Scheme = "light", width: int = 1200
+    ) -> chromium.Browser:
         path = tmp_path / "tree.html"
         render.write(nodes_of(root), path, cards=cards_of(root))
-        window.scheme(scheme)
-        window.point(0, 0)
+        window.page.emulate_media(color_scheme=scheme)
+        window.page.mouse.move(0, 0)
         window.open(path, width=width)
         return window
 
@@ -99,22 +101,25 @@ def test_every_node_is_drawn_in_its_shape_and_nothing_is_loaded(show: Open) -> N
 
 def test_pointing_at_a_node_shows_its_card_until_the_pointer_has_left_both(show: Open) -> None:
     window = show(sample())
-    window.point(*middle(window, "Grasp"))
+    window.page.mouse.move(*middle(window, "Grasp"))
     text = window.wait_for(SHOWN)
     for part in ("gripper: Grasp", "result.stalled", "pick_and_place.yaml:", "Gripper.Goal"):
         assert part in text
     x, y = window.run(f"const b = {CARD}.getBoundingClientRect(); return [b.x + 60, b.y + 40]")
-    window.point(x, y)
+    window.page.mouse.move(x, y)
     window.run("window.later = performance.now() + 400")
     window.wait_for("performance.now() > window.later")
     assert not window.run(f"return {CARD}.hidden")
-    window.point(2, 400)
+    window.page.mouse.move(2, 400)
     assert window.wait_for(f"{CARD}.hidden") is True
 
 
 def test_a_tap_keeps_the_card_and_escape_closes_it(show: Open) -> None:
     window = show(sample(), width=390)
-    window.point(*middle(window, "Deliver the part"), click=True, touch=True)
+    x, y = middle(window, "Deliver the part")
+    touch = window.page.context.new_cdp_session(window.page)
+    for kind, points in (("touchStart", [{"x": x, "y": y}]), ("touchEnd", [])):
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
     assert "fallback" in window.wait_for(SHOWN)
     window.keys("Escape")
     assert window.wait_for(f"{CARD}.hidden") is True
@@ -125,11 +130,11 @@ def test_the_keyboard_walks_folds_and_shows_cards(show: Open) -> None:
     window.run("document.querySelector('#theme').focus()")
     window.keys("Tab")
     assert focused(window) == "Deliver the part"
-    window.keys("Down")
+    window.keys("ArrowDown")
     assert focused(window) == "Pick and place"
     assert "Pick and place" in window.wait_for(SHOWN)
     before = names(window)
-    window.keys("Left")
+    window.keys("ArrowLeft")
     expanded = "return document.activeElement.getAttribute('aria-expanded')"
     assert window.run(expanded) == "false"
     assert focused(window) == "Pick and place"
@@ -137,7 +142,7 @@ def test_the_keyboard_walks_folds_and_shows_cards(show: Open) -> None:
     window.keys("Enter")
     assert window.run(expanded) == "true"
     assert names(window) == before
-    window.keys("Right", "Right", "Left")
+    window.keys("ArrowRight", "ArrowRight", "ArrowLeft")
     assert focused(window) == "Pick and place"
     window.keys("End")
     assert focused(window) == before[-1]
@@ -149,15 +154,15 @@ def test_the_keyboard_walks_folds_and_shows_cards(show: Open) -> None:
 
 def test_a_click_on_the_knob_folds_and_the_node_stays_under_the_pointer(show: Open) -> None:
     window = show(long(200))
-    window.point(*middle(window, "Part 9", ".knob"), click=True)
+    window.page.mouse.click(*middle(window, "Part 9", ".knob"))
     assert len(names(window)) == 30
     place = middle(window, "Part 9")
-    window.point(*middle(window, "Part 8", ".knob"), click=True)
-    window.point(*middle(window, "Part 9", ".knob"), click=True)
+    window.page.mouse.click(*middle(window, "Part 8", ".knob"))
+    window.page.mouse.click(*middle(window, "Part 9", ".knob"))
     assert len(names(window)) == 30
     assert place[1] != pytest.approx(middle(window, "Part 9")[1], abs=20.0)
     place = middle(window, "Part 8")
-    window.point(*middle(window, "Part 8", ".knob"), click=True)
+    window.page.mouse.click(*middle(window, "Part 8", ".knob"))
     assert middle(window, "Part 8") == pytest.approx(place, abs=2.0)
     assert len(names(window)) == 21
 
@@ -199,10 +204,10 @@ def test_on_a_phone_what_is_found_or_gone_to_is_above_the_card(
     else:
         window.run("document.getElementById('unfold').click()")
         window.run("document.querySelector('#n0').focus()")
-        window.keys(*["Down"] * names(window).index(name))
+        window.keys(*["ArrowDown"] * names(window).index(name))
     window.wait_for(SHOWN)
     for height in (800, 500):  # its keyboard opens
-        window.resize(390, height)
+        window.page.set_viewport_size({"width": 390, "height": height})
         assert window.wait_for(
             "(() => { const box = document.querySelector('.node.shown .shape')"
             ".getBoundingClientRect();"
@@ -222,11 +227,11 @@ def test_a_large_tree_opens_at_its_root_and_its_first_child(width: int, show: Op
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_every_text_can_be_read_in_light_and_dark(scheme: str, show: Open) -> None:
+def test_every_text_can_be_read_in_light_and_dark(scheme: chromium.Scheme, show: Open) -> None:
     window = show(sample(), scheme=scheme)
     for _ in range(2):
-        window.point(0, 0)
-        window.point(*middle(window, "Grasp"))
+        window.page.mouse.move(0, 0)
+        window.page.mouse.move(*middle(window, "Grasp"))
         window.wait_for(SHOWN)
         assert window.run(CONTRAST) >= 4.5
         window.run("document.getElementById('theme').click()")
@@ -248,7 +253,7 @@ def test_a_tree_with_a_script_for_a_name_does_nothing(show: Open) -> None:
     leaf = MoveRobot(NASTY, 0.0, action_name=NASTY, save={NASTY: "result.final_pose"})
     window = show(Sequence(NASTY, memory=True, children=[leaf]))
     window.run("document.querySelector('.node:last-child').focus()")
-    window.keys("Up", "Down")
+    window.keys("ArrowUp", "ArrowDown")
     assert NASTY in window.wait_for(SHOWN)
     assert window.run("return window.pwned ?? null") is None
     assert window.run("return document.querySelectorAll('img, script, svg').length") == 3

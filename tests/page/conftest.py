@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import expect
 
 from bt_actions.events import Event
 from bt_actions.page import server
@@ -91,8 +92,8 @@ def begin() -> Iterator[Begin]:
 
 
 @pytest.fixture(scope="module")
-def window(tmp_path_factory: pytest.TempPathFactory) -> Iterator[chromium.Browser]:
-    with chromium.browser(tmp_path_factory.mktemp("browser")) as opened:
+def window() -> Iterator[chromium.Browser]:
+    with chromium.browser() as opened:
         yield opened
 
 
@@ -122,18 +123,15 @@ class Page:
         self.place = f"http://127.0.0.1:{served.port}/"
 
     def open(self, address: str = "", width: int = 1440) -> chromium.Browser:
-        self.window.open("about:blank")
         self.window.open(self.place + address, width=width, height=900)
         assert self.window.wait_for(SHOWN)
         return self.window
 
     def text(self, where: str, words: str) -> str:
         """Wait for words in an element; return its text."""
-        element = f"document.querySelector({where!r})"
-        found = self.window.wait_for(f"{element}?.innerText.includes(arguments[0])", words)
-        text = str(self.window.run(f"return {element}?.innerText"))
-        assert found, text
-        return text
+        found = self.window.page.locator(where)
+        expect(found).to_contain_text(words, use_inner_text=True, timeout=10_000.0)
+        return found.inner_text()
 
 
 @pytest.fixture

@@ -3,11 +3,10 @@ a system forces, and without motion."""
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 
 from bt_actions import load_tree, render
 from bt_actions.document.cards import cards_of
@@ -20,32 +19,25 @@ pytestmark = [
     pytest.mark.ros,
 ]
 PANES = ["tab=details", "tab=values", "tab=log&t=2.0", "view=graph", "pane=time", "pane=log"]
-BARRIERS = """
-axe.run(document, { runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"] })
-  .then((found) => { window.barriers = found.violations
-    .flatMap(({ id, nodes }) => nodes.map((one) => `${id}: ${one.html.slice(0, 200)}`)); });
-"""  # noqa: E501
+RULES = {
+    "runOnly": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"],
+    "resultTypes": ["violations"],
+}
 FOCUS = "return document.activeElement.getAttribute('aria-label') || document.activeElement.id"
 
 
-def barriers(window: chromium.Browser) -> Any:
+def barriers(window: chromium.Browser) -> list[str]:
     """What axe-core finds on the page as it is now."""
-    window.cdp("Runtime.evaluate", expression=_axe())
-    window.run(f"window.barriers = null; {BARRIERS}")
-    return window.wait_for("window.barriers && JSON.stringify(window.barriers)")
-
-
-def _axe() -> str:
-    package = pytest.importorskip("axe_playwright_python", exc_type=ImportError).__name__
-    return files(package).joinpath("axe.min.js").read_text("utf-8")
+    found = Axe().run(window.page, options=RULES).response["violations"]
+    return [f"{each['id']}: {node['html'][:200]}" for each in found for node in each["nodes"]]
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1920, 1440, 390])
-def test_there_are_no_barriers_on_any_pane(over: Page, scheme: str, width: int) -> None:
-    over.window.scheme(scheme)
+def test_there_are_no_barriers_on_any_pane(over: Page, scheme: chromium.Scheme, width: int) -> None:
+    over.window.page.emulate_media(color_scheme=scheme)
     for pane in PANES:
-        assert barriers(over.open(f"#{pane}", width=width)) == "[]"
+        assert barriers(over.open(f"#{pane}", width=width)) == []
 
 
 def test_there_are_no_barriers_in_help_and_in_the_choice_of_runs(over: Page) -> None:
@@ -53,7 +45,7 @@ def test_there_are_no_barriers_in_help_and_in_the_choice_of_runs(over: Page) -> 
     for opener, opened in (("help-open", "#help"), ("switch", "#runs .opt")):
         window.run(f"document.getElementById('{opener}').click()")
         window.wait_for(f"document.querySelector('{opened}')?.checkVisibility()")
-        assert barriers(window) == "[]"
+        assert barriers(window) == []
         window.keys("Escape")
 
 
@@ -65,11 +57,11 @@ def test_there_are_no_barriers_in_a_tree_that_is_drawn(
     render.write(nodes_of(root), path, cards=cards_of(root))
     window.open(path, width=1440)
     window.keys("Tab")
-    assert barriers(window) == "[]"
+    assert barriers(window) == []
     click = "dispatchEvent(new Event('click', { bubbles: true }))"
     window.run(f"document.querySelector('.node').{click}")
     assert window.wait_for("!document.getElementById('card').hidden")
-    assert barriers(window) == "[]"
+    assert barriers(window) == []
 
 
 def test_the_tree_is_walked_folded_and_searched_by_keys_alone(over: Page) -> None:
@@ -77,16 +69,16 @@ def test_the_tree_is_walked_folded_and_searched_by_keys_alone(over: Page) -> Non
     assert window.wait_for("document.querySelector('.row[aria-selected=true]') !== null")
     window.run("document.querySelector('.row[aria-selected=true]').focus()")
     assert window.run(FOCUS).startswith("Home, MoveRobot, ABORTED")
-    window.keys("Left")  # to the parent
+    window.keys("ArrowLeft")  # to the parent
     assert window.wait_for(f"(() => {{ {FOCUS} }})().startsWith('Home in time')")
-    window.keys("Left")  # folds it
+    window.keys("ArrowLeft")  # folds it
     folded = "document.activeElement.getAttribute('aria-expanded')"
     assert window.wait_for(f"{folded} === 'false'")
-    window.keys("Right")
+    window.keys("ArrowRight")
     assert window.wait_for(f"{folded} === 'true'")
     window.keys("Home")
     assert window.wait_for(f"(() => {{ {FOCUS} }})().startsWith('Shift, sequence')")
-    window.keys("End", "Up", "Down", "Enter")
+    window.keys("End", "ArrowUp", "ArrowDown", "Enter")
     window.keys("/")
     assert window.run(FOCUS) == "Find a node"
     window.keys(*"grasp", "Enter")
@@ -110,7 +102,7 @@ def test_all_that_can_be_pressed_is_reached_by_tab_and_seen_to_be(over: Page) ->
     assert set(wanted) <= set(reached)
     assert [each for each in reached if each.startswith("row-")] != []
     before = window.run("return page.t")
-    window.keys("Left")
+    window.keys("ArrowLeft")
     assert window.wait_for("page.t < arguments[0]", before)
 
 
@@ -119,14 +111,13 @@ def test_a_splitter_is_moved_by_keys_and_says_where_it_is(over: Page) -> None:
     now = "+document.getElementById('split-side').getAttribute('aria-valuenow')"
     wide = window.run("document.getElementById('split-side').focus(); return side.offsetWidth")
     assert window.run(f"return {now}") == wide
-    window.keys("Left")
+    window.keys("ArrowLeft")
     assert window.wait_for(f"side.offsetWidth === {wide} + 24 && {now} === {wide} + 24")
 
 
 @pytest.mark.parametrize("pane", ["tree", "time", "details", "values", "log"])
 def test_at_200_percent_each_pane_has_the_window(over: Page, pane: str) -> None:
     window = over.window
-    window.open("about:blank")
     window.open(f"{over.place}#pane={pane}", width=720, height=450)  # half of 1440 by 900
     assert window.wait_for("window.page?.shown")
     assert window.run("return document.documentElement.scrollWidth") <= 720
@@ -136,8 +127,7 @@ def test_at_200_percent_each_pane_has_the_window(over: Page, pane: str) -> None:
 
 
 def test_forced_colours_show_what_is_chosen_and_how_nodes_stand(over: Page) -> None:
-    features = [{"name": "forced-colors", "value": "active"}]
-    over.window.cdp("Emulation.setEmulatedMedia", features=features)
+    over.window.page.emulate_media(forced_colors="active")
     try:
         window = over.open("#t=4.0")
         colour = (
@@ -152,7 +142,7 @@ def test_forced_colours_show_what_is_chosen_and_how_nodes_stand(over: Page) -> N
             f"return new Set({phases}.map((one) => getComputedStyle(one).backgroundColor)).size > 1"
         )
     finally:
-        over.window.cdp("Emulation.setEmulatedMedia", features=[])
+        over.window.page.emulate_media(forced_colors="null")
 
 
 def test_nothing_moves_by_itself_where_nothing_comes(over: Page) -> None:

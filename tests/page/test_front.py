@@ -33,7 +33,6 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def opened(window: chromium.Browser, served: Served) -> Iterator[chromium.Browser]:
-    window.open("about:blank")
     window.complaints()
     window.open(f"{served.address}&runs", width=1440, height=900)
     assert window.wait_for("document.querySelector('#other h1')?.innerText.includes('on')")
@@ -125,7 +124,6 @@ def test_where_several_runs_go_on_the_page_opens_with_its_front(
 ) -> None:
     for number in (1, 2):
         begin(named(RUNS, number, "patrol")).write(named(RUNS, number, "patrol"))
-    window.open("about:blank")
     window.open(served.address)
     assert window.wait_for(f"{CARDS}.length === 2")
     window.open(f"{served.address}&run={'01' * 16}")
@@ -188,11 +186,11 @@ def test_the_front_is_not_wider_than_the_window(
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_there_are_no_barriers_on_the_front(
-    opened: chromium.Browser, served: Served, begin: Begin, scheme: str
+    opened: chromium.Browser, served: Served, begin: Begin, scheme: chromium.Scheme
 ) -> None:
     record(told_of())
     begin(named(RUNS, 1, "patrol")).write(named(RUNS, 1, "patrol"))
-    opened.scheme(scheme)
+    opened.page.emulate_media(color_scheme=scheme)
     opened.open(f"{served.address}&runs", width=1440, height=900)
     assert opened.wait_for(f"{ROWS}.length === 2 && {CARDS}.some((one) => one.includes('patrol'))")
-    assert barriers(opened) == "[]"
+    assert barriers(opened) == []

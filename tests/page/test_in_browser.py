@@ -1,6 +1,6 @@
 """The page as a reader has it, in Chromium: a real run that failed, and runs that go on.
 
-Skipped where there is no Chromium with its chromedriver.
+Skipped where there is no Chromium.
 """
 
 from __future__ import annotations
@@ -112,8 +112,8 @@ def test_nothing_is_wider_than_the_window(over: Page, width: int) -> None:
 
 @pytest.mark.ros
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_every_text_can_be_read_in_light_and_dark(over: Page, scheme: str) -> None:
-    over.window.scheme(scheme)
+def test_every_text_can_be_read_in_light_and_dark(over: Page, scheme: chromium.Scheme) -> None:
+    over.window.page.emulate_media(color_scheme=scheme)
     for pane in ("tab=details", "tab=values", "tab=log&t=2.0", "view=graph"):
         assert over.open(f"#{pane}").run(CONTRAST) == []
 
@@ -317,7 +317,6 @@ def test_a_page_that_has_taken_much_begins_anew_where_it_is(page: Page, begin: B
 
 
 def test_a_page_without_a_run_shows_the_first_that_begins(page: Page) -> None:
-    page.window.open("about:blank")
     page.window.open(page.place)
     page.text("#other", "No run yet")
     record(told_of())

@@ -41,7 +41,6 @@ def test_a_page_and_graphviz_give_a_node_the_same_shape_colour_and_words(
     events = told_of()
     began = next(each for each in events if isinstance(each, RunBegan))
     record([replace(began, nodes=tuple(NODES)), *events[1:2]])
-    window.open("about:blank")
     window.open(f"{served.address}&view=graph")
     window.wait_for("window.page?.shown")
     window.run("import('/looks.js').then((found) => { window.looks = found; })")

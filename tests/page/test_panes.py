@@ -90,9 +90,11 @@ def test_a_press_and_a_drag_on_the_timeline_set_the_time(
     ruler = place(window, "document.getElementById('ruler')")
     y = ruler["y"] + ruler["height"] / 2
     (first, second, _) = window.run(f"return {BARS}")
-    window.point(first, y, click=True)
+    window.page.mouse.click(first, y)
     assert window.wait_for("Math.abs(page.t - 0.5) < 0.05")
-    window.drag((first, y), (second, y))
+    window.page.mouse.down()
+    window.page.mouse.move(second, y)
+    window.page.mouse.up()
     assert window.wait_for("Math.abs(page.t - 2.0) < 0.05")
     assert window.run("return page.at_head") is False
 

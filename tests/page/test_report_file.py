@@ -35,7 +35,6 @@ def opened(window: chromium.Browser, tmp_path: Path) -> Iterator[chromium.Browse
 
 
 def show(window: chromium.Browser, path: Path) -> None:
-    window.open("about:blank")
     window.open(path, width=1440, height=900)
     assert window.wait_for("window.page?.shown")
 

@@ -26,7 +26,6 @@ def front(
     window: chromium.Browser,
     served: Served,
 ) -> chromium.Browser:
-    window.open("about:blank")
     window.open(f"{served.address}&runs", width=1440, height=900)
     assert window.wait_for("document.querySelector('#other h1')?.innerText === 'No run goes on'")
     return window
