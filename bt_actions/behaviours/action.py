@@ -1,9 +1,9 @@
-"""A py_trees leaf that sends a goal to a ROS action and stays RUNNING until it stands.
+"""A py_trees leaf that sends a goal to a ROS action and stays RUNNING until its outcome stands.
 
 The leaf keeps py_trees' contract to the letter (`setup(node=...)`, initialise, update, terminate,
-shutdown) and may be ticked by anybody. A tick never blocks. ROS is first touched in `setup`.
-Here stand the visit to the leaf and its attempts. What happens to a goal is decided in goals/; how
-it goes out, and an answer comes back, is told at the head of traffic/__init__.py.
+shutdown), and any program may tick it. A tick never blocks. ROS is first touched in `setup`. This
+file has the visit to the leaf and its attempts. goals/ decides the course of a goal. The head of
+traffic/__init__.py tells how a goal goes out, and how an answer comes back.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Progress:
     """The work of an action at this moment."""
 
     state: str
-    """A goal's state, or IDLE before the first visit, BACKOFF between two attempts."""
+    """The goal's state; IDLE before the first visit, BACKOFF between two attempts."""
     attempt: int
     attempts: int
     feedback: Any
@@ -57,9 +57,9 @@ class Progress:
 
 
 class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
-    """Sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
+    """A leaf that sends one goal, tries again as `retry` says, and ends in SUCCESS or FAILURE.
 
-    While it runs, `feedback_message` has the goal's state and its latest feedback in short form.
+    While the leaf runs, `feedback_message` has the goal's state and its latest feedback in short.
 
     Args:
         name: as in py_trees; the tree language wants it without a colon.
@@ -70,25 +70,25 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
             evaluated when a goal is sent, for each attempt anew.
         timeout: deadlines in seconds; a bare number is the result's, None means the defaults.
         retry: how often and when to try again; a bare number is the attempts in all.
-        expect: what a result must be, beyond the server's word: a callable on the result message,
-            or an expression over ``result`` and blackboard variables (``result.stalled``).
-        save: blackboard keys, and what each is set to on success: an expression as for `expect`
-            (``{"final_pose": "result.final_pose"}``), or a function of the result. Raising
-            ValueError makes the result an unexpected one.
-        save_on_failure: as `save`, of a visit that fails; `outcome` says why. What a failure does
-            not have keeps its value, which is that of an empty result as a visit begins.
+        expect: a condition on the result, beyond the server's word: a callable on the message, or
+            an expression over ``result`` and blackboard variables (``result.stalled``).
+        save: blackboard keys, each with its value on success: an expression as for `expect`
+            (``{"final_pose": "result.final_pose"}``), or a function of the result. A ValueError
+            makes the result an unexpected one.
+        save_on_failure: as `save`, for a visit that fails; `outcome` says why. A value that the
+            failure lacks stays that of an empty result, which a visit begins with.
         busy: what to do when the resources are taken: wait, replace, fail or share.
-        resources: what the goal occupies, in place of the action server; named as servers are, so
-            a relative name is expanded with the node's namespace.
+        resources: the names that the goal occupies, in place of the action server; named as
+            servers are, so a relative name is expanded with the node's namespace.
         until: a condition on each feedback message, as `expect` is on the result: where it holds,
-            the goal is canceled, and the leaf succeeds when that has been canceled, or has
-            succeeded; `expect` is not asked then. However else it ends, there is no other attempt.
-        on_change: what to do where the goal's fields, computed anew at each tick, differ from what
-            was sent, while that executes: ignore it, `replace` the goal by another one at once, or
-            `cancel` it, and send another one when it has ended. The leaf stays RUNNING, and only
-            the end of the newest goal counts; `timeout.result` runs on, and no attempt is used.
+            the goal is canceled. The leaf succeeds when the goal has ended as canceled or
+            succeeded; `expect` is not asked then. After any other end, no attempt follows.
+        on_change: what to do with an executing goal where its fields, computed anew at each tick,
+            have changed: ignore that, `replace` the goal by another one at once, or `cancel` the
+            goal, and send another one when it has ended. The leaf stays RUNNING, and only the end
+            of the newest goal counts; `timeout.result` runs on, and no attempt is used.
         on_feedback: called with each feedback message, on the ticking thread, before the outcome
-            is seen; of those that come between two ticks, or while it runs, the newest 100.
+            is seen; the newest 100 messages between two ticks, or during one, are kept.
 
     Raises ValueError for a policy, an expression or a place that makes no sense.
     """
@@ -128,7 +128,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         self.resources = frozenset(resources or ())
         self.on_change = on_change
         if on_change != "ignore":
-            self.asks = lambda: True  # at each tick what would be sent now
+            self.asks = lambda: True  # the fields are computed at each tick
         self.on_feedback = on_feedback
         self.expect = expect
         self.save = dict(save or {})
@@ -145,21 +145,21 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         self._attempts = Attempts(self.retry, self._reading.when)
         self._outcome: Outcome | None = None
 
-    # What a caller may read after a tick
+    # State for callers, to be read after a tick
 
     @property
     def outcome(self) -> Outcome | None:
-        """Why the last visit ended, or None while it lasts and before the first."""
+        """The outcome of the last visit; None during a visit, and before the first."""
         return self._outcome
 
     @property
     def end(self) -> End | None:
-        """How the last goal stands on its server, as far as is known by now."""
+        """The end of the last goal, as far as is known by now."""
         return self._handle.goal.end if self._handle is not None else None
 
     @property
     def result(self) -> Any:
-        """The last result message, also of a goal that failed; None where there was none."""
+        """The last result message, also of a goal that failed; None without one."""
         return self._handle.goal.result if self._handle is not None else None
 
     @property
@@ -176,20 +176,20 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
     @property
     def reason(self) -> str:
         """The outcome in words, or an empty text."""
-        return history[-1].reason if (history := self.history) else ""  # of this visit alone
+        return history[-1].reason if (history := self.history) else ""  # this visit's alone
 
     @property
     def expected(self) -> str:
-        """The condition that a result must meet, as it was written; or ""."""
+        """The condition on a result, as it was written; or ""."""
         return self._reading.wanted
 
     @property
     def server(self) -> str:
-        """The action's fully qualified name once set up, and until then as it was given."""
+        """The action's fully qualified name, once set up; before that the given name."""
         return str(self._own.name) if self._own is not None else self.action_name
 
     def progress(self) -> Progress:
-        """Return what the action is doing at this moment; safe to call from any thread."""
+        """Return the work of the action at this moment; safe to call from any thread."""
         handle, backend = self._handle, self._backend
         state, feedback, left, deadline = "IDLE", None, None, ""
         if backend is not None and handle is not None:
@@ -210,11 +210,14 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
 
     @property
     def draining(self) -> bool:
-        """Whether a goal of this leaf has to end yet, within its `timeout.cancel` and the like."""
+        """Whether a goal of this leaf has yet to end, within its deadlines."""
         return any(handle.goal.outcome is None for handle in self.open_handles())
 
     def due_in(self) -> float | None:
-        """Return the seconds until this leaf needs a tick though nothing has happened."""
+        """Return the seconds until this leaf needs a tick of its own accord.
+
+        None: it needs none.
+        """
         if self._backend is None or self._handle is None or not self._is_recorded(self._handle):
             return None  # while a goal is open, traffic/driver.py applies its deadlines
         return self._attempts.pause_left(self._backend.now())
@@ -222,11 +225,13 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
     # py_trees' contract
 
     def setup(self, **kwargs: Any) -> None:
-        """Connect to the action, on the node given as ``node=``; again for the same node: fine.
+        """Connect to the action, on the node given as ``node=``.
+
+        A second call for the node is fine.
 
         Raises TypeError without a node, or when the name is in use with another type; ValueError
-        for a name that ROS refuses, a goal of constants that is none of this action, and a field
-        that its result has not; UnknownInterface (a LookupError) when the action type is not
+        for a name that ROS refuses, for constants that are no goal of this action, and for a field
+        that its result lacks; UnknownInterface (a LookupError) when the action type is not
         installed.
         """
         action: Any = interface(self.action_type, "action")
@@ -249,7 +254,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
     def initialise(self) -> None:
         """Begin a visit. Goals that an earlier visit left behind are drained beside it."""
         backend, _ = self._connection()
-        ActionBehaviour.terminate(self, Status.INVALID)  # where the first tick of a visit broke off
+        ActionBehaviour.terminate(self, Status.INVALID)  # after a first tick that broke off
         self._attempts = Attempts(self.retry, self._reading.when)
         self._outcome = None
         self._is_enough = False
@@ -258,7 +263,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         self._begin(backend)
 
     def update(self) -> Status:
-        """Take the goal as far as it goes at this moment; begins one attempt at most."""
+        """Take the goal as far as it goes at this moment; begin one attempt at most."""
         backend, _ = self._connection()
         if self._outcome is not None:
             self.initialise()  # shut down while RUNNING, and set up again: another visit
@@ -274,7 +279,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
                 handle, begun = self._begin(backend), True
             backend.traffic.advance(handle, self._make_message, self._is_plain)
             decided = handle.is_decided  # then all of its feedback is here
-            for _ in range(len(handle.feedback)):  # not what comes meanwhile: a tick must end
+            for _ in range(len(handle.feedback)):  # no later ones: a tick must end
                 message = handle.feedback.popleft()
                 if self.on_feedback is not None and not self._is_over():
                     self.on_feedback(message)
@@ -303,7 +308,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
                 return self._finish(record)
 
     def terminate(self, new_status: Status) -> None:
-        """Let go at once of a goal that is still open; it is canceled and drained."""
+        """Let go at once of an open goal; it is canceled and drained."""
         handle, backend = self._handle, self._backend
         if backend is None or handle is None:
             return
@@ -311,18 +316,18 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
             self._let_go_of_older(handle, backend)
             backend.traffic.interrupt(handle)
             outcome, reason = handle.goal.outcome, handle.goal.reason
-            if outcome in (None, Outcome.SUCCEEDED):  # nobody has looked at the result
+            if outcome in (None, Outcome.SUCCEEDED):  # the result was not looked at
                 outcome, reason = Outcome.CANCELED, reason or "interrupted by the tree"
             self.history.append(self._record(handle, outcome, reason, backend))
             self._tell(self.history[-1], None)
             self.feedback_message = f"{outcome}: {reason}"
-        self._outcome = self.history[-1].outcome  # also where it stops in the pause before a retry
+        self._outcome = self.history[-1].outcome  # also in the pause before a retry
 
     def shutdown(self) -> None:
         """Cancel all live goals of the whole tree, wait for their ends, and let go of the client.
 
-        py_trees calls this leaf by leaf, and calls no terminate before; users destroy the node on
-        the next line. So the first leaf closes for all, under one deadline.
+        py_trees calls this leaf by leaf, without a terminate before; users destroy the node on the
+        next line. So the first leaf closes for all, under one deadline.
         """
         if self._backend is None:
             return
@@ -335,47 +340,48 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
             leaf._let_go()  # noqa: SLF001 - of our own kind
 
     def open_handles(self) -> list[GoalHandle]:
-        """Return the goals of this leaf that are not over, left behind ones too.
-
-        Also those that a second server has taken when they had ended here.
-        """
+        """Return the goals of this leaf that are not over, left ones and a second server's too."""
         open_there = [] if self._own is None else self._own.handles
         taken = [handle for handle in open_there if handle.owner is self]
         ours = dict.fromkeys([*self._left_behind, self._handle, *taken])
         return [handle for handle in ours if handle is not None and not handle.is_over]
 
-    # What a leaf for actions of one type may know better
+    # Hooks for leaves of one action type
 
     hides_goal = False
     """Whether no event and no reason tells its goals."""
     tells_whole_result = False
-    """Whether a result is data for a caller, so that all of it is told, however large."""
+    """Whether a result is data for a caller, and told whole, however large."""
 
     def names(self, result: Any) -> Mapping[str, object]:
-        """Return what expressions may name, of a result; of None, with any value."""
+        """Return the names for expressions over a result, with their values.
+
+        Any values for None.
+        """
         return {"result": result}
 
     def settles(self, result: Any) -> bool:
-        """Return whether nothing the goal began still runs, by its result; else its end is UNKNOWN.
+        """Return whether nothing the goal began still runs, by its result.
 
-        Asked with None where the goal was aborted, and its result was lost. Called under the lock
-        of all goals: look at the result, and do nothing else.
+        False makes its end UNKNOWN.
+
+        The result of an aborted goal may be lost, and None. Called under the lock of all goals.
         """
         return True
 
     def explain(self, outcome: Outcome, result: Any) -> str:
-        """Return what to add to the reason of a goal that has not succeeded, or nothing."""
+        """Return an addition to the reason of a goal that has not succeeded, or ""."""
         told = outcome is Outcome.ABORTED and result is not None
         return f"its result is: {shorten(result, 150)}" if told else ""
 
-    # Within
+    # Internals
 
     def _begin(self, backend: Backend) -> GoalHandle:
         """Begin an attempt."""
         return self._send(backend, self.timeouts.result)
 
     def _send(self, backend: Backend, result: float | None, busy: Busy | None = None) -> GoalHandle:
-        """Begin a goal, whose result is due so many seconds after it is accepted."""
+        """Begin a goal, whose result is due so many seconds after its acceptance."""
         self._renews = False
         self._left_behind = self.open_handles()
         timeouts = self.timeouts
@@ -397,11 +403,11 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
 
     def _is_recorded(self, handle: GoalHandle) -> bool:
         """Return whether this attempt is over and in the history."""
-        history = self.history  # a new visit begins a new one
+        history = self.history  # a new visit has a new one
         return bool(history) and history[-1].goal is handle.goal
 
     def _is_plain(self) -> bool:
-        """Return whether no code of the user's can run where the goal is made into a message."""
+        """Return whether the goal becomes a message without code of the user's."""
         goal = self.goal
         return type(goal) is dict and all(type(each) in _PLAIN for each in goal.values())
 
@@ -409,7 +415,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         action: Any = self.action_type
         teller = current_teller.get()
         if teller is not None:
-            teller.reads_secret = False  # whatever was read of the attempt before
+            teller.reads_secret = False  # forget the reads of the attempt before
         try:
             data = self._sent = self._data()
             return fill(action.Goal, data, now=self._connection()[0].stamp)
@@ -441,7 +447,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         return AttemptRecord(handle.attempt, outcome, reason, begun, ended, goal.result, goal)
 
     def _tell(self, record: AttemptRecord, again_in: float | None) -> None:
-        """Tell the run what was made of an attempt."""
+        """Tell the run the verdict on an attempt."""
         if (teller := current_teller.get()) is None or not teller.is_heard:
             return
         hides = bool(record.reason) and (
@@ -474,7 +480,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         return Status.SUCCESS if record.outcome is Outcome.SUCCEEDED else Status.FAILURE
 
     def _read_result(self, result: Any) -> str:
-        """Read the result, and save what is kept of it; or return what is wrong with it."""
+        """Read the result and save its values; return the objection to it, or ""."""
         return self._reading.read(result)
 
     def _in_words(self, handle: GoalHandle) -> str:

@@ -22,16 +22,16 @@ class Asking(Timed):
     """A node whose questions fail the visit where they raise ValueError, with its text."""
 
     reads_secret = False
-    """Whether it has read a secret in this visit, so that no event tells what it says."""
+    """Whether the node has read a secret in this visit, so that no event tells its message."""
     refused = False
-    """Whether it failed by itself: its child did not, or was not ticked this time."""
+    """Whether the node failed by itself: its child did not fail, or was not ticked this time."""
     left_out = False
-    """Whether its parent goes on as if it were not there, once it has ended."""
+    """Whether the parent goes on as if the ended node were not there."""
 
     def _begin_visit(self) -> None:
         """Begin a visit."""
         self.feedback_message, self.reads_secret, self.left_out = "", False, False
-        self._seconds = 0.0  # where it is given none
+        self._seconds = 0.0  # unless `give` sets a time
         self.initialise()
 
     def _answer(self, question: Callable[[], Status | None]) -> Status | None:
@@ -47,7 +47,7 @@ class Asking(Timed):
 
 
 class Rounds(Asking):
-    """A node that has rounds, which are counted and told; `_times` says how many at most."""
+    """A node whose rounds are counted and told; `_times` says how many at most."""
 
     _again, _counts, _least = Status.SUCCESS, "times", 0
     _pauses = Retry()
@@ -69,11 +69,11 @@ class Rounds(Asking):
 
     @property
     def item(self) -> object:
-        """What the present round is about; None where rounds have but a number."""
+        """The item of the present round; None where rounds have only a number."""
         return None
 
     def tell_round(self) -> None:
-        """Tell that a round begins, once."""
+        """Tell, once, that a round begins."""
         if self._told == self._done:
             return
         self._told = self._done
@@ -84,7 +84,7 @@ class Rounds(Asking):
             teller.tell(RoundBegan, self, self._done, None if hides else self._limit, item)
 
     def count(self) -> Status:
-        """Count a round that is done, and return the status that follows."""
+        """Count a round that is done; return the status that follows."""
         self._done += 1
         self.feedback_message = f"{self._done}{self._of} done"
         if self._done == self._limit:
@@ -104,7 +104,7 @@ class Tries(Rounds):
         return status
 
     def tell_success(self) -> None:
-        """Say which attempt has succeeded, if not the first."""
+        """Name the attempt that has succeeded, if not the first."""
         if self._done:
             self.feedback_message = f"attempt {self._done + 1}{self._of} succeeded"
 
@@ -115,6 +115,6 @@ def actions_below(root: Behaviour) -> list[ActionBehaviour]:
 
 
 def still_ends(root: Behaviour) -> str:
-    """Return for whose goal below a node that was stopped one has to wait; or ""."""
+    """Name a leaf below a stopped node whose goal has yet to end; or ""."""
     leaves = (node.name for node in actions_below(root) if node.draining)
     return next((f"waiting for {name} to end" for name in leaves), "")

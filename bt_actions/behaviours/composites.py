@@ -1,7 +1,7 @@
-"""Composites that py_trees has not: a retry that recovers, a choice, a pipeline, turns.
+"""Composites beyond those of py_trees: a retry that recovers, a choice, a pipeline, turns.
 
-They are py_trees' composites, and work in anybody's tree. `work` says which child is ticked next:
-it yields what these ticks yield, and returns the status that follows.
+They are composites of py_trees, and work in any tree. `work` ticks one child after another: it
+yields what their ticks yield, and returns the status that follows.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from bt_actions.behaviours.leaving import is_left_out, leave_out
 from bt_actions.goals.policy import Retry
 
 Work = Generator[Behaviour, None, Status]
-"""Ticks of children, and what follows from them."""
+"""The ticks of children, and the status that follows."""
 
 
 class Working(Asking, Composite):
-    """Stops what still runs below when it ends; children have no status when a visit begins."""
+    """A composite that stops running children at its end, and resets all children at its start."""
 
     def due_in(self) -> float | None:
-        """Return None: a composite has no time of its own, unless it says so."""
+        """Return None: a composite has no time of its own, unless it overrides this."""
         return None
 
     def work(self) -> Work:
@@ -61,15 +61,15 @@ class Working(Asking, Composite):
 
 
 class Recover(Tries, Working):
-    """Tries its child, and does something about each failure but the last, before the next attempt.
+    """A composite that tries its child, and ticks `recover` after each failure but the last.
 
     The attempts follow each other in the same tick where nothing takes time, unless their number
-    has no limit. What fails to recover has failed for good.
+    has no limit. A failure of `recover` is a failure of the node.
 
     Args:
         name: as in py_trees.
-        child: what to try.
-        recover: what to do after a failure, when another attempt is to come.
+        child: the child to try.
+        recover: the child to tick after a failure, when another attempt is to come.
         attempts: all tries, or a function that gives their number; None is without limit.
         retry: the pauses, between `recover` and the next attempt, on the node's clock.
     """
@@ -94,7 +94,7 @@ class Recover(Tries, Working):
         self._recovers = False
 
     def due_in(self) -> float | None:
-        """Return the seconds until the next attempt; None while something runs."""
+        """Return the seconds until the next attempt; None while a child runs."""
         return None if any(each.status is Status.RUNNING for each in self.children) else self.left()
 
     def work(self) -> Work:
@@ -124,17 +124,17 @@ class Recover(Tries, Working):
 
 
 class If(Working):
-    """Ticks one of two children, as a condition says.
+    """A composite that ticks one of two children, as a condition says.
 
     Args:
         name: as in py_trees.
         condition: asked in each visit until it has an answer; a child that succeeds (yes) or fails
             (no), or a function that may raise ValueError, which fails the node.
-        then: what to do where it holds.
-        otherwise: what to do where it does not; None fails.
-        memory: whether the choice is kept to the end of the visit. Else the condition is asked
-            before each tick, and what is not chosen any more is stopped; the other begins when the
-            goals of what was stopped have ended.
+        then: the child for yes.
+        otherwise: the child for no; None fails.
+        memory: whether the choice is kept to the end of the visit. Otherwise the condition is asked
+            before each tick, and a child that is not chosen any more is stopped; the other child
+            begins when the goals of the stopped one have ended.
     """
 
     def __init__(
@@ -156,7 +156,7 @@ class If(Working):
         self._chosen: Behaviour | None = None
         self._has_chosen = False
         self._ends: Behaviour | None = None
-        """The branch that was stopped, and whose goals may still run."""
+        """The stopped branch, whose goals may still run."""
 
     def work(self) -> Work:
         if not (self._has_chosen and self.memory):
@@ -198,10 +198,10 @@ class If(Working):
 
 
 class Pipeline(Working):
-    """Ticks its children in order, and those again that have succeeded, while a later one runs.
+    """A composite that ticks its children in order, succeeded ones again while a later one runs.
 
-    It ticks up to the first child that is RUNNING at or behind the farthest place that it has
-    reached; children before that may run, too. It fails with any of them, and succeeds with the
+    A tick goes up to the first RUNNING child at or behind the farthest place that the visit has
+    reached; children before that may run, too. The node fails with any child, and succeeds with the
     last. A child that has succeeded begins again at each tick; `Every` holds it back.
 
     Args:
@@ -235,8 +235,8 @@ class Pipeline(Working):
 class InTurn(Working):
     """A fallback that begins behind the child that has succeeded last.
 
-    A visit tries each child once, from there to the last and on from the first. It begins at the
-    first child after all have failed, after it was stopped while it ran, and after `shutdown`.
+    A visit tries each child once, from there to the last and on from the first. The visit begins at
+    the first child after all have failed, after a stop while it ran, and after `shutdown`.
 
     Args:
         name: as in py_trees.

@@ -17,14 +17,14 @@ T = TypeVar("T")
 
 
 class Connected(Generic[T]):
-    """Part of what cannot do without a node: it has one thing of its own there."""
+    """The part of a behaviour that needs a node: it has one thing of its own there."""
 
     name: str
     _backend: Backend | None = None
     _own: Any = None
 
     def setup(self, **kwargs: Any) -> None:
-        """Connect to the node given as ``node=``; again for the same node: fine."""
+        """Connect to the node given as ``node=``; a second call for the same node is fine."""
         node = kwargs.get("node")
         if node is None:
             raise TypeError(f"{self.name}: setup needs a ROS node: tree.setup(node=node)")
@@ -34,17 +34,17 @@ class Connected(Generic[T]):
             self._own, self._backend = self._make(backend), backend
 
     def _make(self, backend: Backend) -> T:
-        """Make what it needs there."""
+        """Make the thing of its own on the node."""
         raise NotImplementedError
 
     def _connection(self) -> tuple[Backend, T]:
-        """Return the node, and what it has there."""
+        """Return the node, and the thing there."""
         if self._backend is None or self._own is None:
             raise RuntimeError(f"{self.name}: not set up; call setup(node=node) before ticking")
         return self._backend, self._own
 
     def _let_go(self) -> None:
-        """Let go of both."""
+        """Close the thing, and forget the node."""
         if self._own is not None:
             self._own.close()
         self._own = self._backend = None
@@ -54,7 +54,7 @@ class Connected(Generic[T]):
 
 
 class Stopwatch:
-    """Seconds since it was made; a clock that jumps back takes none of them away."""
+    """A measure of the seconds since it was made, which a clock that jumps back does not reduce."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         self._now, self._passed, self._seen = now, 0.0, now()
@@ -70,7 +70,7 @@ class Stopwatch:
 class Timed(Behaviour):
     """A behaviour with a time that runs out.
 
-    In seconds of the node's clock where there is a node, of the steady clock elsewhere.
+    The time is in seconds of the node's clock where there is a node, of the steady clock elsewhere.
     """
 
     _backend: Backend | None = None
@@ -89,7 +89,7 @@ class Timed(Behaviour):
         return self._seconds and max(0.0, self._seconds - self._watch.passed())
 
     def due_in(self) -> float | None:
-        """Return the seconds until it needs a tick though nothing has happened."""
+        """Return the seconds until the behaviour needs a tick of its own accord."""
         return self.left()
 
     def left_to_run(self) -> float | None:
@@ -101,7 +101,7 @@ class Timed(Behaviour):
 
 
 class Leaf(Timed):
-    """A leaf that says in `do` what it does, and fails where that raises ValueError."""
+    """A leaf with its work in `do`; a ValueError there fails the leaf."""
 
     _seconds = math.inf
 
@@ -109,7 +109,7 @@ class Leaf(Timed):
         return None if math.isinf(self._seconds) else self.left()
 
     def do(self) -> Status:
-        """Do what a tick does; may raise ValueError (ExpressionError is one)."""
+        """Do the work of a tick; may raise ValueError (ExpressionError is one)."""
         raise NotImplementedError
 
     def update(self) -> Status:

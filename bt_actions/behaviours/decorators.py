@@ -1,6 +1,6 @@
-"""Decorators: one that decides before each tick whether its child is ticked, and what it is for.
+"""Decorators that decide before each tick whether to tick their child: `Gate`, and its kinds.
 
-A deadline and a guard, which stop their child, a tree inside a tree, and loops.
+The kinds are a deadline and a guard, which stop their child, a tree inside a tree, and loops.
 """
 
 from __future__ import annotations
@@ -22,12 +22,11 @@ from bt_actions.utilities.units import parse_duration
 
 
 class Gate(Asking, Decorator):
-    """Like py_trees' Decorator, with a question asked first.
+    """A decorator of py_trees, with a question before each tick.
 
-    A subclass says in `gate` what to do: None ticks the child, RUNNING waits without ticking it,
-    SUCCESS and FAILURE end the node. `update` then says what the child's status means: itself,
-    where nothing else is said. Where one of them or `initialise` raises ValueError, the visit fails
-    with its text.
+    A subclass answers in `gate`: None ticks the child, RUNNING waits without a tick, SUCCESS and
+    FAILURE end the node. `update` then turns the child's status into the node's, by default
+    unchanged. A ValueError of these two, or of `initialise`, fails the visit with its text.
     """
 
     def gate(self) -> Status | None:
@@ -38,11 +37,17 @@ class Gate(Asking, Decorator):
         return self.decorated.status
 
     def without(self) -> Status:
-        """Say what follows from a child that was left out: the node is left out with it."""
+        """Return the status that follows from a child that was left out.
+
+        The node is left out with it.
+        """
         return leave_out(self)
 
     def due_in(self) -> float | None:
-        """Return the seconds until the child can begin anew; 0 without a pause; None if it runs."""
+        """Return the seconds until the child can begin anew; 0 without a pause.
+
+        None while it runs.
+        """
         return None if self.decorated.status is Status.RUNNING else self.left()
 
     def tick(self) -> Iterator[Behaviour]:
@@ -70,15 +75,15 @@ class Gate(Asking, Decorator):
 
 
 class Deadline(Gate):
-    """Stops its child after some seconds, and fails when what it stopped has ended.
+    """A decorator that stops its child after some seconds, and fails when the goals have ended.
 
-    py_trees' Timeout fails at once, so that whatever comes next runs beside a goal that is still
+    py_trees' Timeout fails at once, so that the next behaviour runs beside a goal that is still
     being canceled. A goal that does not end within its own deadlines is waited for no longer, as a
     leaf waits for it no longer; its resources stay taken.
 
     Args:
         name: as in py_trees.
-        child: what may take only so long.
+        child: the child that may take only so long.
         after: seconds on the node's clock; may raise ValueError, which fails.
     """
 
@@ -115,12 +120,12 @@ class Deadline(Gate):
 
 
 class While(Gate):
-    """Ticks its child as long as a condition holds; stops it and fails when it does not.
+    """A decorator that ticks its child as long as a condition holds, then stops it and fails.
 
     Args:
         name: as in py_trees.
         child: what to do meanwhile.
-        condition: asked before each tick; raising ValueError counts as no.
+        condition: asked before each tick; a ValueError counts as no.
     """
 
     def __init__(self, name: str, child: Behaviour, condition: Callable[[], bool]) -> None:
@@ -134,11 +139,11 @@ class While(Gate):
 
 
 class Every(Gate):
-    """Begins its child at once, and again that long after its last success.
+    """A decorator that begins its child at once, and again that long after its last success.
 
-    Until then it is RUNNING, and does not tick the child. Its clock runs on after a success, and
-    ends with a failure, or when the node is stopped. So it holds its child back in a `Pipeline`,
-    and in a `Repeat`.
+    Until then the node is RUNNING, and does not tick the child. The period runs on after a success,
+    and ends with a failure, or when the node is stopped. So the node holds its child back in a
+    `Pipeline`, and in a `Repeat`.
 
     Args:
         name: as in py_trees.
@@ -147,7 +152,7 @@ class Every(Gate):
     """
 
     _since: Stopwatch | None = None
-    """Since the last success."""
+    """The time since the last success."""
 
     def __init__(self, name: str, child: Behaviour, period: float | None) -> None:
         super().__init__(name, child)
@@ -177,15 +182,15 @@ class Every(Gate):
 
 
 class Subtree(Gate):
-    """Ticks another tree with inputs of its own.
+    """A decorator that ticks another tree with inputs of its own.
 
     Args:
         name: as in py_trees.
         child: the root of the tree.
-        begin: writes the inputs, each time the tree starts; raises ValueError for one that has no
-            value or does not fit, which fails the subtree before its first tick.
+        begin: writes the inputs, each time the tree starts; raises ValueError for an input that has
+            no value or does not fit, which fails the subtree before its first tick.
         end: gives back the outputs, when the tree has succeeded or failed; raises ValueError for
-            one that does not fit, which fails the subtree.
+            an output that does not fit, which fails the subtree.
         pass_on: writes the inputs that have changed, before each tick but the first.
     """
 
@@ -204,7 +209,7 @@ class Subtree(Gate):
         self._end = end
         self._pass_on = pass_on
         if pass_on is not None:
-            self.asks = lambda: True  # at each tick for its inputs
+            self.asks = lambda: True  # the inputs are computed at each tick
 
     def initialise(self) -> None:
         try:
@@ -232,14 +237,14 @@ class Subtree(Gate):
 
 
 class Repeat(Rounds, Gate):
-    """Ticks its child again when it has succeeded; fails as soon as it fails.
+    """A decorator that ticks its child again after a success, and fails with the child.
 
     Args:
         name: as in py_trees.
         child: what to repeat.
         times: how often in all; for ever where not given. May raise ValueError, which fails.
         until: asked after each round that has succeeded: where it holds, the node succeeds, and
-            when no round is left, it fails. May raise ValueError, which fails.
+            when no round is left, the node fails. May raise ValueError, which fails.
     """
 
     passes_on = True
@@ -292,7 +297,7 @@ class Repeat(Rounds, Gate):
 
 
 class RetryChild(Tries, Repeat):
-    """Ticks its child again when it has failed, after a pause.
+    """A decorator that ticks its child again after a failure and a pause.
 
     Args:
         name: as in py_trees.
@@ -318,7 +323,7 @@ class RetryChild(Tries, Repeat):
 
 
 class ForEach(Repeat):
-    """Ticks its child once for each item of a list.
+    """A decorator that ticks its child once for each item of a list.
 
     Args:
         name: as in py_trees.
@@ -326,8 +331,8 @@ class ForEach(Repeat):
         items: gives the list, when the node starts; may raise ValueError, which fails the node.
         begin: called with item and index before each round, to write them where the child reads;
             may raise ValueError, which fails the node.
-        keep_going: whether an item that failed is left behind; the node then succeeds if any item
-            did, or the list was empty.
+        keep_going: whether the loop goes on after an item that failed; the node then succeeds if
+            any item did, or the list was empty.
     """
 
     passes_on = True

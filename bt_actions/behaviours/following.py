@@ -1,4 +1,4 @@
-"""Goals that follow what they are made from: what of an action's leaf sends another one."""
+"""Goals that follow their fields: the part of an action's leaf that sends another goal."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ ON_CHANGE = ("ignore", "replace", "cancel")
 
 
 class Following:
-    """Compares at each tick what would be sent now with what was sent.
+    """The comparison, at each tick, of the sent goal with the goal that would be sent now.
 
-    Besides the newest goal of a leaf runs one at most, which that is to replace: a change that
-    comes meanwhile waits, and the newest one counts.
+    Beside the newest goal of a leaf runs one other at most, which the newest is to replace. A
+    change that comes meanwhile waits, and the newest change counts.
     """
 
     action_type: Any
@@ -31,20 +31,20 @@ class Following:
     open_handles: Callable[[], list[GoalHandle]]
     _send: Callable[..., GoalHandle]
     _sent: object = None
-    """What the newest goal was made from."""
+    """The data of the newest goal."""
     _renews = False
     """Whether another goal is to follow when this one, which is canceled, has ended."""
     _result_left: float | None = None
-    """The seconds that it has then for its result."""
+    """The seconds that the other goal then has for its result."""
 
     def _data(self) -> object:
-        """Compute what a goal is made from."""
+        """Compute the data of a goal."""
         return resolve(self.goal() if callable(self.goal) else self.goal)
 
     def _is_outdated(self, newest: GoalHandle, backend: Backend) -> bool:
-        """Return whether another goal is to be sent now in the place of one that executes.
+        """Return whether to send another goal now in the place of one that executes.
 
-        While the one has to end that this has replaced, another one is to follow this one's end.
+        While an older goal has yet to end, the other goal is to follow the end of this one.
         """
         if newest.goal.state is not State.EXECUTING:
             return False
@@ -58,7 +58,7 @@ class Following:
         return False
 
     def _differs(self) -> bool:
-        """Return whether what would be sent now is another goal than was sent, and can be sent."""
+        """Return whether the goal that would be sent now is sound, and unlike the sent one."""
         try:
             data = self._data()
             if same(data, self._sent):
@@ -68,11 +68,11 @@ class Following:
                 fill(self.action_type.Goal, each, now=lambda: 0) for each in (data, self._sent)
             )
             return bool(one != other)
-        except Exception:  # noqa: BLE001 - the user's: any; what was sent runs on
+        except Exception:  # noqa: BLE001 - the user's: any; the sent goal runs on
             return False
 
     def _follow(self, newest: GoalHandle, backend: Backend) -> GoalHandle:
-        """Send a goal in the place of one that is outdated, or cancel that one first."""
+        """Send a goal in the place of an outdated one, or cancel that one first."""
         left = backend.traffic.result_due_in(newest)
         if self.on_change == "replace":
             return self._send(backend, left, Busy.REPLACE)

@@ -1,7 +1,7 @@
 """`only_if` and `only_while` of any node: conditions under which a node is there at all.
 
-A gate is a part of its node, not another one: what is RUNNING, and was only asked as it began, is
-ticked as without a gate.
+A gate is a part of its node, and no node itself: a RUNNING node with `only_if` alone is ticked as
+if it had no gate.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ Condition = Callable[[], str]
 def gate(behaviour: Behaviour, words: Mapping[str, str], **conditions: Condition) -> None:
     """Have a behaviour be left out where a condition does not hold.
 
-    Of the conditions `only_if` is asked as a visit begins, `only_while` before each tick. A
-    behaviour that runs is stopped, and is RUNNING until the goals below it have ended. `words` say
-    the conditions, for those who show the node.
+    `only_if` is asked as a visit begins, `only_while` before each tick. A running behaviour is
+    stopped, and is RUNNING until the goals below it have ended. `words` are the conditions as text,
+    for views.
     """
     _Gate(behaviour, conditions.get("only_if"), conditions.get("only_while"))
     behaviour.gates = dict(words)  # type: ignore[attr-defined]
@@ -37,20 +37,20 @@ class _Gate:
         self._tick = behaviour.tick
         self._asks = getattr(behaviour, "asks", lambda: False)
         self._why = ""
-        """Why the node was stopped, and is to be left out."""
+        """The reason why the node was stopped, and is to be left out."""
         self._error = ""
-        """Why it was stopped, and is to fail."""
+        """The reason why the node was stopped, and is to fail."""
         behaviour.left_out = False  # type: ignore[attr-defined]
         behaviour.asks = self.asks  # type: ignore[attr-defined]
         behaviour.tick = self.tick  # type: ignore[method-assign]
 
     def asks(self) -> bool:
-        """Return whether something is asked at each tick."""
+        """Return whether a condition is asked at each tick."""
         left_out: bool = self._node.left_out  # type: ignore[attr-defined]
         return self._while is not None or left_out or self._asks()
 
     def tick(self) -> Iterator[Behaviour]:
-        """Tick the behaviour; without another level of generators where nothing is to be asked."""
+        """Tick the behaviour, without another level of generators where no condition is asked."""
         if self._while is None and self._node.status is Status.RUNNING:
             return self._tick()
         return self._asked()

@@ -1,4 +1,4 @@
-"""What a node of a tree is, in words: its kind, and the action that it sends goals to. No ROS."""
+"""The words for a node of a tree: its kind, and the action that it sends goals to. No ROS."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ _WORDS = {
     behaviours.Failure: "failure",
     behaviours.Running: "running",
 }
-"""The words for classes of py_trees. One of ours says its own by `in_words`, or by its name."""
+"""The words for classes of py_trees. A class of ours has its own in `in_words`, or in its name."""
 
 
 def kind(node: Behaviour) -> str:
-    """Return what `node` is, in the words of the YAML language where it has one."""
+    """Return the kind of `node`, in the words of the YAML language where it has one."""
     word = type(node).__name__
     for base in type(node).__mro__:
         if base in _WORDS:

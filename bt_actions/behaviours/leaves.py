@@ -1,6 +1,6 @@
-"""Leaves that do something small and need no ROS: wait, check, set variables, write to the log.
+"""Small leaves without ROS: wait, check, set variables, write to the log.
 
-A ValueError of a function that is given to them fails the leaf, with its text.
+A ValueError of a given function fails the leaf, with its text.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from bt_actions.utilities.units import parse_duration
 
 
 def stood_for(expression: Expression, variable: Callable[[str], object]) -> str:
-    """Say behind a colon what stands for the variables in a condition; or ""."""
+    """Say behind a colon the values of the variables in a condition; or ""."""
     seen = expression.seen({}, variable).items()
     stood = ", ".join(f"{name} is {shorten(value, 60)}" for name, value in seen)
     return f": {stood}" if stood else ""
 
 
 class Wait(Leaf):
-    """Succeeds after some seconds on the node's clock."""
+    """A leaf that succeeds after some seconds on the node's clock."""
 
     def __init__(self, name: str, duration: Callable[[], object]) -> None:
         super().__init__(name)
@@ -42,7 +42,7 @@ class Wait(Leaf):
 
 
 class WaitUntil(Limited):
-    """Succeeds as soon as a condition holds; fails after `timeout` seconds where one is given.
+    """A leaf that succeeds as soon as a condition holds, and fails after `timeout` seconds.
 
     A condition that cannot be computed yet (a variable without a value) does not hold yet.
     """
@@ -66,7 +66,7 @@ class WaitUntil(Limited):
 
 
 class Check(Leaf):
-    """Succeeds when an expression over variables is true; `variable` looks them up."""
+    """A leaf that succeeds when an expression over variables is true; `variable` looks them up."""
 
     def __init__(
         self, name: str, expression: Expression, variable: Callable[[str], object]
@@ -83,7 +83,7 @@ class Check(Leaf):
 
 
 class SetValues(Leaf):
-    """Computes values and writes them, which `write` does; all or none."""
+    """A leaf that computes values and writes them with `write`; all or none."""
 
     in_words = "set"
 
@@ -97,7 +97,7 @@ class SetValues(Leaf):
 
 
 class Log(Leaf):
-    """Writes a line to the node's log (Python's where there is no node), and succeeds.
+    """A leaf that writes a line to the node's log (Python's without a node), and succeeds.
 
     Args:
         name: as in py_trees.

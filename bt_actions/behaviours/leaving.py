@@ -1,10 +1,10 @@
 """Nodes that are left out: their parents go on as if they were not there.
 
-py_trees has no status for that, and needs none: a node that is left out has the status with which
-the composite above goes on, and `left_out` tells those that have to know. Sequence and Selector of
-py_trees need not; where nodes below may be left out, `Sequence` and `Fallback` here are left out
-themselves when all of their children were, and so are `Invert`, `ForceSuccess`, `ForceFailure` and
-`RunOnce` with their child.
+py_trees has no status for that, and needs none: a left-out node has the status with which the
+composite above goes on, and `left_out` tells the rest. Sequence and Selector of py_trees need no
+more. Where nodes below may be left out, `Sequence` and `Fallback` here are left out themselves when
+all of their children were, and so are `Invert`, `ForceSuccess`, `ForceFailure` and `RunOnce` with
+their child.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from bt_actions.events.kinds import LEFT_OUT
 
 
 def is_left_out(node: Behaviour) -> bool:
-    """Return whether a node that has ended was left out."""
+    """Return whether an ended node was left out."""
     return bool(getattr(node, "left_out", False))
 
 
@@ -84,7 +84,7 @@ class ForceFailure(_OfChild, decorators.SuccessIsFailure):
 
 
 class RunOnce(_OfChild, decorators.OneShot):
-    """A decorator that may be left out, and has not run then."""
+    """A decorator that may be left out, which does not count as its run."""
 
     def terminate(self, new_status: Status) -> None:
         if not self.left_out:

@@ -11,7 +11,7 @@ from bt_actions.expressions.text import ExpressionError
 
 
 class Inputs:
-    """What a node is given: each is computed when it is read, which may raise ExpressionError."""
+    """The inputs of a node; a read computes the value, and may raise ExpressionError."""
 
     _values: Mapping[str, Callable[[], object]]
 
@@ -25,7 +25,7 @@ class Inputs:
 
 
 class Outputs:
-    """What a node gives: set in a visit, and written when that ends."""
+    """The outputs of a node: set in a visit, and written when the visit ends."""
 
     _names: Collection[str]
     _given: dict[str, object]
@@ -47,8 +47,8 @@ def equip(
 ) -> None:
     """Give a behaviour `inputs` and `outputs`.
 
-    `write` is called with all that was set, as a visit ends; where that raises ValueError, or an
-    input has no value, the behaviour fails.
+    `write` is called with all set outputs as a visit ends; a ValueError there, or an input without
+    a value, fails the behaviour.
     """
     behaviour.inputs = Inputs(inputs)  # type: ignore[attr-defined]
     behaviour.outputs = Outputs(outputs)  # type: ignore[attr-defined]

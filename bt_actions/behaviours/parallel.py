@@ -15,11 +15,11 @@ _OVER = (Status.SUCCESS, Status.FAILURE)
 
 
 class Parallel(PyTreesParallel):
-    """Succeeds when enough children have; fails as soon as that cannot happen any more.
+    """A composite that succeeds when enough children have, and fails as soon as that cannot happen.
 
-    That is decided after each child: those that run are stopped then, and the children behind are
-    not ticked. py_trees' own Parallel fails with the first child that
-    does, whatever the policy, and starts finished children again unless told otherwise.
+    The decision is made after each child: running children are stopped then, and the children
+    behind are not ticked. py_trees' own Parallel fails with the first failed child, whatever the
+    policy, and starts finished children again unless told otherwise.
 
     Args:
         name: as in py_trees.
@@ -55,7 +55,7 @@ class Parallel(PyTreesParallel):
         count = Counter(child.status for child in self.children if not is_left_out(child))
         status, left_out = self._decide(count, needed, 0), 0
         for child in self.children:
-            if child.status not in _OVER or is_left_out(child):  # which is asked again
+            if child.status not in _OVER or is_left_out(child):  # left-out ones are asked again
                 yield from child.tick()
                 if child.status in _OVER and is_left_out(child):
                     left_out += 1
@@ -76,7 +76,7 @@ class Parallel(PyTreesParallel):
         yield self
 
     def _decide(self, count: Counter[Status], needed: int, left_out: int) -> Status:
-        """Return what follows from how many children have ended how."""
+        """Return the status that follows from the counts of ended children."""
         done, failed = count[Status.SUCCESS], count[Status.FAILURE]
         self.feedback_message = f"{done} of {needed} succeeded, {failed} failed"
         if done >= needed or (self.at_least is None and done + left_out >= needed):

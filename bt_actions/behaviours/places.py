@@ -1,4 +1,4 @@
-"""Where a behaviour stands in its tree."""
+"""The place of a behaviour in its tree."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def in_order(root: Behaviour) -> Iterator[Behaviour]:
 
 
 def innermost(frame: FrameType | None) -> Behaviour | None:
-    """Return the innermost behaviour whose method the frame, or one that called it, is of."""
+    """Return the innermost behaviour with a method on the stack of this frame."""
     while frame is not None:
         if isinstance(behaviour := frame.f_locals.get("self"), Behaviour):
             return behaviour
@@ -43,7 +43,7 @@ def innermost(frame: FrameType | None) -> Behaviour | None:
 
 
 def culprit_of(error: BaseException) -> Behaviour | None:
-    """Return the innermost behaviour on the way to where `error` was raised."""
+    """Return the innermost behaviour on the way to the place where `error` was raised."""
     culprit, traceback = None, error.__traceback__
     while traceback is not None:
         candidate = traceback.tb_frame.f_locals.get("self")

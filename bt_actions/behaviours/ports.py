@@ -1,7 +1,7 @@
 """`MoveRobot` and `Gripper` as tags of py_trees' own XML trees, with ports.
 
-After `import bt_actions` this file is imported with `py_trees.parsers`, to which it makes the tags
-known. py_trees marks ports as experimental.
+`import bt_actions` imports this file together with `py_trees.parsers`, which then knows the tags.
+py_trees marks ports as experimental.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class _ActionWithPorts(PortsMixin, ActionBehaviour):
             name,
             self.ACTION_TYPE,
             action_name or self.SERVER,
-            # A port without data makes it INVALID_GOAL
+            # A port without data makes the goal INVALID_GOAL
             lambda: {port: self.get_input(port) for port in self.input_ports()},
             timeout=None if timeout is None else parse_duration(timeout),
             retry=int(attempts),  # an XML attribute is a text

@@ -1,7 +1,7 @@
-"""How a leaf reads a result: whether it is as expected, and what of it is saved. No ROS.
+"""The reading of a result by a leaf: the check against `expect`, and the values to save. No ROS.
 
-A result is what an action or a service gave, or a message of a topic. Conditions and places are
-functions of it; as text, ``$x`` in them is a variable, and ``result`` what the server gave.
+A result is the answer of an action or a service, or a message of a topic. Conditions and places are
+functions of a result; in their text, ``$x`` is a variable, and ``result`` the server's answer.
 """
 
 from __future__ import annotations
@@ -21,22 +21,25 @@ from bt_actions.utilities.shorten import shorten
 from bt_actions.utilities.suggest import did_you_mean
 
 Names = Callable[[Any], Mapping[str, object]]
-"""From a result to what an expression over it may name; called with None, what it could name."""
+"""From a result to the names for expressions over it; from None, to all possible names."""
 Given = Callable[[Any], Any] | str
 
 
 def of_result(result: Any) -> Mapping[str, object]:
-    """What most expressions may name."""
+    """Return the names for most expressions."""
     return {"result": result}
 
 
 def of_feedback(feedback: Any) -> Mapping[str, object]:
-    """What expressions over feedback may name."""
+    """Return the names for expressions over feedback."""
     return {"feedback": feedback}
 
 
 def of_failure(given: Any) -> Mapping[str, object]:
-    """What expressions over a failure may name, of a result (None where there was none) and why."""
+    """Return the names for expressions over a failure.
+
+    A result (None without one) and an outcome.
+    """
     if given is None:
         return {"result": None, "outcome": None}
     result, outcome = given
@@ -45,15 +48,15 @@ def of_failure(given: Any) -> Mapping[str, object]:
 
 @dataclass(slots=True, eq=False)
 class Formula:
-    """An expression over a result, as a function of that."""
+    """An expression over a result, as a function of that result."""
 
     expression: Expression
     names: Names
     variable: Callable[[str], object] = read
     fit: Callable[[Any], object] | None = None
-    """What makes of the value what is kept of it; None for a condition."""
+    """The function that makes the kept value of the computed one; None for a condition."""
     get: Callable[[Any], object] | None = None
-    """What gets a value that is kept as it is, in less time."""
+    """A faster function for a value that is kept as it is."""
 
     @property
     def text(self) -> str:
@@ -61,11 +64,11 @@ class Formula:
         return self.expression.text
 
     def seen(self, given: Any) -> dict[str, object]:
-        """What stood for the names in it."""
+        """Return the values of the names in the expression."""
         return self.expression.seen(self.names(given), self.variable)
 
     def __call__(self, given: Any) -> Any:
-        """The value; raises ExpressionError, and ValueError for one that does not fit."""
+        """Return the value; raises ExpressionError, and ValueError for one that does not fit."""
         if self.get is not None:
             return self.get(given)
         if self.fit is None:
@@ -86,12 +89,12 @@ class Reading:
         names: Names = of_result,
         what: str = "result",
     ) -> None:
-        """`what` says in messages what is read.
+        """Make a reading; `what` names the read thing in messages.
 
-        Raises ValueError for what is neither a function nor an expression.
+        Raises ValueError for a condition or place that is neither a function nor an expression.
         """
         self._names, self._what = names, what
-        self._written: list[tuple[str, Expression]] = []  # what was given as text
+        self._written: list[tuple[str, Expression]] = []  # those given as text
         self._unmet = False
         self._expect = None if expect is None else self._function(expect, "expect")
         self.wanted = str(getattr(self._expect, "text", ""))
@@ -99,9 +102,9 @@ class Reading:
         self._save = {key(name): self._function(place, "save") for name, place in save.items()}
 
     def _function(self, given: Given, use: str) -> Callable[[Any], Any]:
-        """Return what was given as a function of the result.
+        """Return a function of the result for a function or a text.
 
-        Raises ValueError for what is none, naming the `use` it was given for.
+        Raises ValueError for anything else, with the `use` it was given for.
         """
         if callable(given):
             return given
@@ -117,7 +120,7 @@ class Reading:
     def set_up(self, result_type: Any) -> str:
         """Tell the blackboard of the keys, so that it shows them.
 
-        Return which field one of them reads that a result of this type has not; or "".
+        Returns an objection to a field that a result of this type lacks; or "".
         """
         for name in self._save:
             Blackboard.metadata.setdefault(name, KeyMetaData())
@@ -131,7 +134,7 @@ class Reading:
         return ""
 
     def save(self, result: Any) -> None:
-        """Save what of it can be: a place that is not in it keeps what it had."""
+        """Save the values that the result has; the other places keep theirs."""
         saved = {}
         for name, value in self._save.items():
             with contextlib.suppress(ValueError):
@@ -139,13 +142,15 @@ class Reading:
         write(saved)
 
     def seen(self, result: Any) -> dict[str, object]:
-        """What stood for the names in `expect`, where the result that was read last is not as
-        expected; else nothing."""
+        """Return the values of the names in `expect`, where the last result did not meet it.
+
+        Else {}.
+        """
         seen = getattr(self._expect, "seen", None)
         return seen(result) if self._unmet and callable(seen) else {}
 
     def read(self, result: Any) -> str:
-        """Check the result, and save what is to be kept of it; or return what is wrong with it."""
+        """Check the result, and save its values; return the objection to it, or ""."""
         self._unmet = self._expect is not None
         try:
             if self._expect is not None and not self._expect(result):
@@ -156,7 +161,7 @@ class Reading:
         self._unmet = False
         try:
             saved = {name: value(result) for name, value in self._save.items()}
-        except ValueError as error:  # ExpressionError, or what is saved does not fit
+        except ValueError as error:  # ExpressionError, or a value that does not fit
             return str(error)
         write(saved)
         return ""

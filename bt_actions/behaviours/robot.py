@@ -9,7 +9,7 @@ from bt_actions.behaviours.variables import Var
 
 
 class MoveRobot(ActionBehaviour):
-    """Moves the robot to `distance`, a position on its axis in metres, or a Var that holds one.
+    """A leaf that moves the robot to `distance`, in metres on its axis, or to a Var's value.
 
     Keyword arguments are those of ActionBehaviour.
     """
@@ -27,10 +27,10 @@ class MoveRobot(ActionBehaviour):
 
 
 class Gripper(ActionBehaviour):
-    """Moves the gripper to `position`, from 0 (closed) to 100 (open).
+    """A leaf that moves the gripper to `position`, from 0 (closed) to 100 (open).
 
-    `max_effort` is in N, 0 for the gripper's own. Both may be a Var. Whether something is held
-    shows in the result: ``expect="result.stalled"``. Keyword arguments are those of
+    `max_effort` is in N, 0 for the gripper's own. Both may be a Var. The result shows whether the
+    gripper holds something: ``expect="result.stalled"``. Keyword arguments are those of
     ActionBehaviour.
     """
 

@@ -1,7 +1,7 @@
-"""The leaf that has a tree run by a server of trees, on this machine or another one. No ROS here.
+"""The leaf that has a server of trees run a tree, on this machine or another one. No ROS here.
 
-The life of a goal is ActionBehaviour's. Here stand only what is sent and how a result of
-RunTree is read; the server's half is bt_actions/serving/.
+The life of a goal is ActionBehaviour's. This file has only the fields of a goal, and the reading of
+a result of RunTree; the server's half is bt_actions/serving/.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.state import GoalHandle
 
 CANCEL = 15.0
-"""Seconds for a run to end when it is canceled: it sees its own goals to their ends first, within
-5 s each where their trees say nothing else."""
+"""Seconds for a canceled run to end: it sees its own goals to their ends first, within 5 s each
+where their trees say nothing else."""
 
 
 class RunTree(ActionBehaviour):
-    """Has a tree run by a server of trees (`bt-actions serve`), and takes over how it ends.
+    """A leaf that has a tree run by a server of trees (`bt-actions serve`), and takes over its end.
 
     Where the server cannot account for every goal of the run, the end is UNKNOWN here, too,
-    whatever the status. A run that failed tells its root cause as the reason.
+    whatever the status. A run that failed gives its root cause as the reason.
 
     Args:
         name: as in py_trees.
@@ -39,13 +39,12 @@ class RunTree(ActionBehaviour):
             that returns them. NaN, infinities, and integers beyond 64 bits make the goal an
             invalid one.
         server: the name of the server's action.
-        goal_name: what the server calls the goal where it rejects it; the leaf's name where not
-            given.
+        goal_name: the goal's name in the server's rejection; the leaf's name where not given.
         timeout: as for any action; `cancel` is 15 s where nothing else is said.
 
     Other keyword arguments are those of ActionBehaviour; `expect`, `save` and `retry.when` may name
-    ``outputs`` (what the tree gave its outputs, a mapping) beside ``result``:
-    ``save={"at": "outputs.at"}``.
+    ``outputs`` (the values of the tree's outputs, a mapping) beside ``result``: ``save={"at":
+    "outputs.at"}``.
     """
 
     def __init__(
@@ -85,7 +84,7 @@ class RunTree(ActionBehaviour):
         return result is not None and bool(result.settled)
 
     def explain(self, outcome: Outcome, result: Any) -> str:
-        """Return the run's root cause; or where the reason of a rejection is told."""
+        """Return the run's root cause; for a rejection, the place of its reason."""
         if outcome is Outcome.REJECTED:
             return "its log, and its topic ~/rejections, say why"
         return result.error_msg.partition("\n")[0] if result is not None else ""
@@ -102,7 +101,7 @@ class RunTree(ActionBehaviour):
 
 
 def roots_of(result: Any) -> dict[str, object]:
-    """Return what expressions may name of a result; raises ExpressionError for wrong outputs."""
+    """Return the names for expressions over a result; raises ExpressionError for wrong outputs."""
     try:
         outputs = json.loads(getattr(result, "outputs", "") or "{}")
     except (ValueError, RecursionError) as error:
@@ -113,7 +112,7 @@ def roots_of(result: Any) -> dict[str, object]:
 
 
 def inputs_text(values: object) -> str:
-    """Write inputs as RunTree has them. Raises ValueError for one that cannot be sent."""
+    """Write inputs in the form of RunTree. Raises ValueError for a value that cannot be sent."""
     if not isinstance(values, Mapping):
         raise ValueError(f"inputs are a mapping of names to values, not {values!r:.40}")
     plain = to_plain(values)
@@ -122,7 +121,7 @@ def inputs_text(values: object) -> str:
 
 
 def _refuse(value: object, path: str) -> None:
-    """Raise ValueError for what cannot be sent."""
+    """Raise ValueError for a value that cannot be sent."""
     if isinstance(value, dict):
         for key, inner in value.items():
             _refuse(inner, f"{path}.{key}")

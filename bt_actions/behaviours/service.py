@@ -1,4 +1,4 @@
-"""A leaf that calls a ROS service and stays RUNNING until it is answered. A tick never blocks."""
+"""A leaf that calls a ROS service and stays RUNNING until the answer comes. A tick never blocks."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from bt_actions.traffic.backend import Backend, Call, Service
 
 
 class CallService(Connected[Service], Limited):
-    """Calls a service once, and again as `retry` says.
+    """A leaf that calls a service once, and again as `retry` says.
 
-    A call that was not answered in time may have been carried out all the same: it is tried again
-    only where `retry` asks for it.
+    A call without an answer in time may have been carried out all the same: it is tried again only
+    where `retry` asks for that.
 
     Args:
         name: as in py_trees.
@@ -29,9 +29,9 @@ class CallService(Connected[Service], Limited):
         request: gives the fields of the request; may raise ValueError, which fails.
         server: seconds to wait for the service to be there; None waits for ever.
         response: seconds to wait for the answer; None waits for ever.
-        retry: how often, with `when` as a callable; its outcomes are not looked at, a service knows
-            only one failure.
-        read: called with the answer; gives what is wrong with it, or an empty text.
+        retry: how often, with `when` as a callable; its outcomes are not looked at, as a service
+            has only one failure.
+        read: called with the answer; returns the objection to it, or "".
     """
 
     in_words = "service"
@@ -97,7 +97,7 @@ class CallService(Connected[Service], Limited):
             try:
                 request = fill(self.service_type.Request, self._request(), now=backend.stamp)
             except ValueError:
-                self._tries = self.retry.attempts  # no other try would get further
+                self._tries = self.retry.attempts  # no other attempt would get further
                 raise
             self._call = client.call(request)
             self.give(self._patience)
@@ -113,21 +113,21 @@ class CallService(Connected[Service], Limited):
         self._drop()
 
     def due_in(self) -> float | None:
-        """Return the seconds until the next deadline, try or look."""
+        """Return the seconds until the next deadline, attempt or look."""
         return self.left() if self._pausing or self._call is not None else LOOKS
 
     def left_to_run(self) -> float | None:
         is_last = self._call is not None and self.retry.attempts == 1
-        return super().left_to_run() if is_last else None  # else another time follows
+        return super().left_to_run() if is_last else None  # else another attempt follows
 
     def _drop(self) -> None:
-        """Take no interest in an answer any more."""
+        """Give up an open call: its answer is dropped."""
         if self._call is not None:
             self._call.cancel()
         self._call = None
 
     def _again(self) -> bool:
-        """Return whether what has failed is tried again; the pause before that begins."""
+        """Return whether to try a failed call again; the pause before that begins."""
         self._tries += 1
         if self._tries >= self.retry.attempts:
             return False
@@ -135,7 +135,7 @@ class CallService(Connected[Service], Limited):
         try:
             if callable(when) and self._response is not None and not when(self._response):
                 return False
-        except ExpressionError as error:  # counts as no, as in goals/attempts.py
+        except ExpressionError as error:  # no, as in goals/attempts.py
             self.feedback_message += f"; retry.when: {error.message}"
             return False
         self._pausing = True

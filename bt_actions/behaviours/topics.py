@@ -1,4 +1,4 @@
-"""Leaves and values that listen to topics and speak on them."""
+"""Leaves and values with topics: they listen, or publish."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from bt_actions.traffic.backend import Backend, Publisher, Subscription
 from bt_actions.traffic.state import waker
 
 LOOKS = 0.05
-"""Seconds between two looks for somebody who listens, or serves: nothing announces that."""
+"""Seconds between two looks for a listener or a service, whose coming nothing announces."""
 KEPT = 100
-"""Messages kept for who waits for one of them; older ones are dropped."""
+"""Messages kept for a leaf that waits for one of them; older messages are dropped."""
 
 
 class TopicValue(Connected[Subscription]):
@@ -32,13 +32,13 @@ class TopicValue(Connected[Subscription]):
         self._given = message_type, topic, qos
         self._max_age = max_age
         self.default: Callable[[], object] | None = None
-        """Gives what is read before the first message, and when the last is too old."""
+        """Gives the value before the first message, and when the last one is too old."""
         self._look_again_at = 0.0
         self._newest: tuple[Any, Stopwatch] | None = None
-        """The latest message, and how old it is on the node's clock."""
+        """The latest message, with its age on the node's clock."""
 
     def setup(self, **kwargs: Any) -> None:
-        """Subscribe where there is a node; not again for the same one."""
+        """Subscribe where there is a node, once for each."""
         if kwargs.get("node") is not None:
             self._wake = waker()
             super().setup(**kwargs)
@@ -53,9 +53,9 @@ class TopicValue(Connected[Subscription]):
         return backend.subscription(interface(message_type, "msg"), topic, qos, take)
 
     def read(self) -> object:
-        """Return the latest message, or the default, where it is missing or too old.
+        """Return the latest message, or the default, where the message is missing or too old.
 
-        Raises ExpressionError where there is no default.
+        Raises ExpressionError without a default.
         """
         if self.default is None:
             return self._latest()
@@ -80,7 +80,7 @@ class TopicValue(Connected[Subscription]):
         return message
 
     def first_may_come(self) -> float:
-        """Return the seconds for which the first message may be on its way; 0 afterwards."""
+        """Return the seconds in which the first message may be on its way; 0 afterwards."""
         if self.default is not None:
             return 0.0
         return 0.0 if self._own is None or self._newest else float(self._own.may_come())
@@ -89,8 +89,8 @@ class TopicValue(Connected[Subscription]):
 def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
     """Have a behaviour begin its visits only when the topics that it reads can be asked.
 
-    It is RUNNING as long as the first message of one may still be on its way, which is so when a
-    process has just begun. Its own code is not called before.
+    The behaviour is RUNNING as long as the first message of one may still be on its way, as in a
+    process that has just begun. Its own code is not called before.
     """
     tick, due_in = behaviour.tick, getattr(behaviour, "due_in", lambda: None)
     awaited: list[TopicValue] = []
@@ -103,7 +103,7 @@ def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
                 behaviour.status = Status.RUNNING
                 yield behaviour
                 return
-            behaviour.status = Status.INVALID  # its visit begins now
+            behaviour.status = Status.INVALID  # the visit begins now
         yield from tick()
 
     def due() -> Any:
@@ -114,15 +114,15 @@ def patient(behaviour: Behaviour, topics: list[TopicValue]) -> None:
 
 
 class WaitForMessage(Connected[Subscription], Limited):
-    """Succeeds with the first message, since it started, that is the one waited for.
+    """A leaf that succeeds with the first message, since its start, that `read` accepts.
 
     Args:
         name: as in py_trees.
         message_type: the message's class or type name.
         topic: a relative name is expanded with the node's namespace.
-        qos: as the tree language calls it.
+        qos: a name of the tree language.
         timeout: seconds on the node's clock after which it fails; None: never.
-        read: called with each message; gives why it is not the one waited for, or an empty text.
+        read: called with each message; returns the objection to it, or "".
     """
 
     def __init__(
@@ -139,7 +139,7 @@ class WaitForMessage(Connected[Subscription], Limited):
         self._given = message_type, topic, qos
         self._timeout = timeout
         self._read = read
-        self._kept: deque[Any] = deque(maxlen=0)  # while it waits: those that were not read yet
+        self._kept: deque[Any] = deque(maxlen=0)  # unread ones, while it waits
 
     def _make(self, backend: Backend) -> Subscription:
         self._came, self._newest, self._wake = 0, list[Any](), waker()
@@ -156,14 +156,14 @@ class WaitForMessage(Connected[Subscription], Limited):
         super().initialise()
         self._connection()
         self._came_before, self._wake = self._came, waker()
-        # What a latched topic delivered before is as good as new
+        # An earlier message of a latched topic is as good as new
         self._kept = deque(self._newest if self._given[2] == "latched" else (), KEPT)
 
     def do(self) -> Status:
         _, subscription = self._connection()
         topic = subscription.name
         self.feedback_message = f"waiting for a message on {topic}"
-        for _ in range(len(self._kept)):  # not what comes meanwhile: a tick must end
+        for _ in range(len(self._kept)):  # no later ones: a tick must end
             self.feedback_message = self._read(self._kept.popleft())
             if not self.feedback_message:
                 return Status.SUCCESS
@@ -179,9 +179,9 @@ class WaitForMessage(Connected[Subscription], Limited):
 
 
 class Publish(Connected[Publisher], Limited):
-    """Publishes one message and succeeds; fails when the message cannot be built.
+    """A leaf that publishes one message and succeeds, or fails when the message cannot be built.
 
-    Before it publishes it waits for who listens: for `subscribers` where given; without that only
+    Before it publishes it waits for listeners: for `subscribers` where given; without that only
     while the node is so new (3.5 seconds) that it may not have discovered them, and only for one.
     Where nobody listens all the same it publishes and succeeds, and `warning` says so. `shutdown`
     returns when all listeners have the last message, or a second after it was published.
@@ -191,7 +191,7 @@ class Publish(Connected[Publisher], Limited):
         message_type: the message's class or type name.
         topic: a relative name is expanded with the node's namespace.
         data: gives the fields of the message; may raise ValueError.
-        qos: as the tree language calls it.
+        qos: a name of the tree language.
         subscribers: so many must listen before it publishes.
         timeout: seconds on the node's clock after which it fails where fewer do, and not while the
             node is new; None: never.
@@ -232,7 +232,7 @@ class Publish(Connected[Publisher], Limited):
                     f"{listeners} of {self._subscribers} subscribers listen on {topic} after"
                     f" {self._timeout:g} s{publisher.why_nobody()}"
                 )
-            self.feedback_message = f"waiting for who listens on {topic}"
+            self.feedback_message = f"waiting for a listener on {topic}"
             return Status.RUNNING
         publisher.publish(fill(self._type, self._data(), now=backend.stamp))
         why = "" if listeners else f"nobody listens on {topic}{publisher.why_nobody()}"
@@ -240,5 +240,5 @@ class Publish(Connected[Publisher], Limited):
         return Status.SUCCESS
 
     def due_in(self) -> float | None:
-        """Return the seconds until it looks again for listeners."""
+        """Return the seconds until the next look for listeners."""
         return LOOKS

@@ -1,7 +1,7 @@
-"""Values that live on py_trees' blackboard, and how goals and results refer to them. No ROS.
+"""Values on py_trees' blackboard, and references of goals and results to them. No ROS.
 
-Everything here reads and writes at the moment it is called, so call it on the ticking thread:
-the blackboard is process-global and has no lock.
+Every function here reads and writes at once, so call it on the ticking thread: the blackboard is
+process-global and has no lock.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from bt_actions.utilities.plain_data import numbers_only
 
 
 class MissingVariable(ValueError, KeyError):
-    """A variable was read that nobody has written, or that has no such field."""
+    """A read of a variable without a value, or without such a field."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -50,7 +50,7 @@ _secret: set[str] = set()
 
 
 def hide(keys: Iterable[str]) -> None:
-    """Have the values of these keys told by no event, nor what is computed from them."""
+    """Have no event tell the values of these keys, nor values computed from them."""
     _secret.update(keys)
 
 
@@ -60,14 +60,14 @@ def unhide(keys: Iterable[str]) -> None:
 
 
 def is_hidden(key: str) -> bool:
-    """Whether the value of this key is told by no event."""
+    """Return whether the value of this key is a secret."""
     return key in _secret
 
 
 def value_of(key: str) -> Any:
-    """Return the value of an absolute key, and take note where that is a secret.
+    """Return the value of an absolute key, and take note of a secret.
 
-    Raises KeyError where it has none.
+    Raises KeyError without a value.
     """
     if key in _secret and (teller := current_teller.get()) is not None:
         teller.reads_secret = True
@@ -96,7 +96,7 @@ def read(name: str) -> Any:
 
 
 def write(values: Mapping[str, object]) -> None:
-    """Give variables their values, by their absolute keys, and tell the run of it."""
+    """Give variables their values, by their absolute keys, and tell the run."""
     Blackboard.storage.update(values)
     if (teller := current_teller.get()) is not None:
         if teller.reads_secret:
@@ -109,13 +109,13 @@ _WRITES = (ActivityType.WRITE.value, ActivityType.INITIALISED.value)
 
 
 class _Overhearing(ActivityStream):
-    """Tells the run that ticks on this thread what a client of the blackboard writes.
+    """A stream that tells the run on this thread the writes of blackboard clients.
 
-    py_trees has one such stream for all; what was there before is told, too.
+    py_trees has one such stream for all; the stream that was there before is told, too.
     """
 
     runs = 0
-    """How many runs want to hear."""
+    """The number of runs that listen."""
 
     def __init__(self, before: ActivityStream | None) -> None:
         super().__init__(maximum_size=0)
@@ -139,7 +139,7 @@ _overhearing = threading.Lock()
 
 
 def overhear() -> None:
-    """Have what clients of the blackboard write told to the runs that tick; see overhear_less."""
+    """Have writes of blackboard clients told to the runs that tick; see overhear_less."""
     with _overhearing:
         _Overhearing.runs += 1
         if not isinstance(Blackboard.activity_stream, _Overhearing):
@@ -169,7 +169,7 @@ def resolve(data: Any, value_of: Callable[[Var], Any] = Var.read) -> Any:
 
 
 def reads_variables(data: Any) -> bool:
-    """Return whether `resolve` would read anything."""
+    """Return whether `resolve` would read any variable."""
     found: list[Var] = []
     resolve(data, found.append)
     return bool(found)
