@@ -1,7 +1,7 @@
-"""The goals of a tree's runs: which are its own, what is told of them, which are unaccounted for.
+"""The goals of a tree's runs: membership, their changes as events, and the unaccounted ones.
 
 A goal is the tree's where its leaf, wherever that is by now, was last ticked in one of its ticks.
-Changes are told on the thread on which they happen. Sends nothing.
+Changes are told on the thread on which they happen. Nothing is sent here.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class RunGoals:
         wake: Callable[[], None],
         on_change: Callable[[], None],
     ) -> None:
-        """`wake` is called where there is reason to tick.
+        """Make the register; `wake` is called where the tree has reason to tick.
 
         `on_change` is called, under the host's lock, where a goal of the tree has changed.
         """
@@ -40,14 +40,14 @@ class RunGoals:
         self._run = RunListener(notify=self._note, feedback=self._feedback, sight=self._sight)
         self._handles: dict[GoalHandle, _Told] = {}  # in the order in which they began
         self._late: dict[GoalHandle, None] = {}
-        """Those with feedback that was not told yet."""
+        """Goals with feedback that was not told yet."""
         self.run_goes_on = False
-        """Between two runs only what earlier ones have left is of interest."""
+        """Whether a run goes on; between two runs only goals of earlier ones are of interest."""
         self.is_watched = True
-        """Whether anybody but its leaf acts on what becomes of a goal."""
+        """Whether an object besides the leaf acts on a goal's changes."""
 
     def begun_in(self, step: Callable[[], T]) -> T:
-        """Return what `step` does; what it sets up and ticks is ours."""
+        """Return the result of `step`; behaviours that it sets up and ticks are this tree's."""
         before, teller = ticking_run.set(self._run), current_teller.set(self._teller)
         try:
             return step()
@@ -57,17 +57,17 @@ class RunGoals:
 
     @property
     def not_over(self) -> list[GoalHandle]:
-        """Those that something is left to wait for."""
+        """The goals with something left to wait for."""
         return [handle for handle in list(self._handles) if not handle.is_over]
 
     @property
     def wanted(self) -> list[GoalHandle]:
-        """Those that a leaf waits for."""
+        """The goals that a leaf waits for."""
         return [handle for handle in list(self._handles) if handle.goal.outcome is None]
 
     @property
     def unaccounted(self) -> list[GoalReport]:
-        """Those whose end is UNKNOWN, by now."""
+        """The goals whose end is UNKNOWN, by now."""
         return [
             report_of(handle.goal, handle.name)
             for handle in list(self._handles)
@@ -76,7 +76,7 @@ class RunGoals:
         ]
 
     def close(self) -> None:
-        """Take note of nothing any more."""
+        """Stop to take note of goals."""
         self._run.notify = lambda handle: None
         self._run.feedback = lambda handle, message: None
         self._run.sight = lambda server, in_sight: None
@@ -89,7 +89,7 @@ class RunGoals:
             self._tell_feedback(handle, self._handles[handle])
 
     def forget(self) -> None:
-        """Forget what is over."""
+        """Forget goals that are over."""
         if over := [each for each in list(self._handles) if each.is_over]:
             with self._lock:
                 for each in over:
@@ -102,7 +102,7 @@ class RunGoals:
         if handle is not None:
             goal = handle.goal
             told = self._handles.get(handle)
-            is_news = told is not None  # else its leaf is just beginning it
+            is_news = told is not None  # else the leaf is just beginning the goal
             if told is None:
                 told = self._handles[handle] = _Told(self._teller.run_id)
             is_of_this_run = told.run_id == self._teller.run_id
@@ -147,7 +147,7 @@ class RunGoals:
         self._teller.stream.add(ServerSeen, server, in_sight)
 
     def _tell_feedback(self, handle: GoalHandle, told: _Told) -> None:
-        """Tell the latest that was not told yet."""
+        """Tell the latest feedback that was not told yet."""
         message, told.feedback = told.feedback, None
         self._late.pop(handle, None)
         if message is not None:
@@ -155,7 +155,7 @@ class RunGoals:
 
 
 class _Told:
-    """What was told of one goal."""
+    """The told part of one goal."""
 
     __slots__ = ("at", "feedback", "result", "run_id")
 
@@ -163,6 +163,6 @@ class _Told:
         self.run_id = run_id
         self.result = False
         self.at = float("-inf")
-        """When feedback was told."""
+        """The moment of the last told feedback."""
         self.feedback: Any = None
-        """The latest that was not told; a snapshot where a leaf's `on_feedback` may change it."""
+        """The latest untold feedback; a snapshot where a leaf's `on_feedback` may change it."""

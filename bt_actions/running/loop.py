@@ -1,9 +1,9 @@
-"""When to tick a tree, and how a run of it ends: one step after another, at times that are given.
+"""The loop of a tree: its ticks, and the end of a run, one step after another at given times.
 
-Ticks when something has happened, when a deadline falls due, and again at once while each tick
-changes a status; a heartbeat covers behaviours that only watch the clock. Whatever ends a run (an
-outcome, an interrupt, a timeout, an exception), the tree's goals are drained before it is over. No
-thread, no wait, no ROS: a thread steps it, or a test in virtual time.
+The loop ticks after an event, at a deadline, and again at once while each tick changes a status; a
+heartbeat covers behaviours that only watch the clock. At the end of a run (by an outcome, an
+interrupt, a timeout, an exception) the tree's goals are drained before the run is over. No thread,
+no wait, no ROS: a thread steps the loop, or a test in virtual time.
 """
 
 from __future__ import annotations
@@ -36,26 +36,28 @@ from bt_actions.wiring import backend_of
 BURST = 1000
 """Ticks in a row, at most, while each changes a status."""
 SLOW = 0.05
-"""Seconds for one event from which on an observer is said to be slow."""
+"""Seconds for one event from which on an observer counts as slow."""
 LONGEST_WAIT = 3600.0
 """Seconds, at most, between two looks at the tree, whatever the heartbeat is."""
 
 
 def check_seconds(timeout: float | None) -> None:
-    """Raise ValueError where it is no number of seconds."""
+    """Raise ValueError for a timeout that is no number of seconds."""
     if timeout is not None and not (isinstance(timeout, Real) and timeout == timeout):
         raise ValueError(f"timeout must be a number of seconds, not {timeout!r}")
 
 
 class _Abandoned(BaseException):
-    """Ends a tick."""
+    """The exception that ends a tick."""
 
 
 class TickLoop:
-    """Runs one tree, again and again: `begin`, then `step` until it returns Done or raises.
+    """The loop of one tree, for run after run.
 
-    Between two steps it wants to be left alone for as long as the first one says, or until `wake`
-    is called; a step that comes earlier does no harm.
+    `begin`, then `step` until it returns Done or raises.
+
+    Between two steps the loop needs no call for as long as the first one says, or until `wake` is
+    called; an earlier step does no harm.
     """
 
     def __init__(
@@ -69,17 +71,17 @@ class TickLoop:
         check: Callable[[], None] = lambda: None,
         misbehaved: Callable[[], str] = lambda: "",
     ) -> None:
-        """Make it; `begin` begins a run.
+        """Make the loop; `begin` begins a run.
 
         Args:
-            tree: what is ticked.
-            node: what each behaviour is set up with; a Backend may stand for it.
-            heartbeat: seconds after which it ticks though nothing has happened; less often where
-                nothing that was ticked watches the clock (ticking.py).
-            wake: is called on any thread, and in signal handlers, where a step is wanted now.
-            ready: is called in each run when the tree is set up, before the first tick.
-            check: is called before each tick; what it raises ends the run.
-            misbehaved: is asked after each behaviour's tick what that did wrong.
+            tree: the tree to tick.
+            node: the node for each behaviour's setup; a Backend may stand for it.
+            heartbeat: seconds between two ticks without an event; more where no ticked behaviour
+                watches the clock (ticking.py).
+            wake: called on any thread, and in signal handlers, where a step is wanted now.
+            ready: called in each run when the tree is set up, before the first tick.
+            check: called before each tick; an error there ends the run.
+            misbehaved: asked after each behaviour's tick for a fault of it.
         """
         self.tree, self._heartbeat = tree, heartbeat
         self._backend = backend_of(node)
@@ -89,7 +91,7 @@ class TickLoop:
         self.teller = TreeTeller(tree, self._backend)
         self._observers: dict[Reader, Observer] = {}
         self._slow = set[Reader]()
-        """Those whose observer is slow, as was said."""
+        """Readers whose observer was said to be slow."""
         self.goals = RunGoals(
             self.teller,
             self._traffic.host,
@@ -108,14 +110,14 @@ class TickLoop:
         self._burst = 0
         self._status = Status.INVALID
         self._error: BaseException | None = None
-        """What is raised after the drain; also what an observer raised to end the program."""
+        """The error to raise after the drain; also that of an observer that ends the program."""
         self._drain: Drain | None = None
 
     def observe_events(self, callback: Observer) -> None:
-        """Call `callback` with each event, in the step; one that raises is removed."""
+        """Call `callback` with each event, in the step; an observer that raises is removed."""
         self._observers[self.teller.stream.reader(room=sys.maxsize)] = callback
 
-    # What anybody may ask for, on any thread
+    # Requests, on any thread
 
     def interrupt(self, now: float, *, abandon: bool = False) -> None:
         """End the run, or the next one; with `abandon`, also the drain. Safe in a handler."""
@@ -130,7 +132,7 @@ class TickLoop:
         self._wake()
 
     def is_to_end(self, now: float) -> bool:
-        """Whether the run was interrupted, has failed, or is out of time."""
+        """Return whether the run was interrupted, has failed, or is out of time."""
         return self._stop_wanted or self._error is not None or now >= self._deadline
 
     # A run
@@ -149,11 +151,12 @@ class TickLoop:
         self.watchdog.begin(self._deadline)
 
     def step(self, now: float) -> Sleep | Done[Status]:
-        """Do what is to be done now (seconds, steady clock).
+        """Do what is due now (seconds, steady clock).
 
-        Returns how long there is nothing to do, unless something wakes it; in the end the tree's
-        status, INVALID when interrupted. In the end it raises, too: TimeoutError out of time, a
-        TreeError where a behaviour raised or had no status, or what else has ended the run.
+        Returns the seconds until the next step, unless a wake-up comes before; at the end the
+        tree's status, INVALID when interrupted. The last step raises TimeoutError when out of time,
+        a TreeError where a behaviour raised or had no status, or another error that has ended the
+        run.
         """
         self._now = now
         if self._drain is None:
@@ -168,10 +171,10 @@ class TickLoop:
     def fail(self, error: BaseException) -> None:
         """Have the next step end the run, which raises `error` after the drain.
 
-        Raises it at once where that has begun.
+        Raises `error` at once where the drain has begun.
         """
         if self._drain is not None:
-            self._error = None  # what has ended the run is not raised again by `shutdown`
+            self._error = None  # `shutdown` does not raise it again
             self._rest()
             raise error
         self._error, self._status = error, Status.INVALID
@@ -184,7 +187,7 @@ class TickLoop:
             self.goals.run_goes_on = False
 
     def _go_on(self) -> float | None:
-        """Tick if that is wanted; return the seconds until the next look, None at the end."""
+        """Tick if a tick is due; return the seconds until the next look, None at the end."""
         if self._error is not None:
             return None
         if self._visitor not in self.tree.visitors:
@@ -211,7 +214,7 @@ class TickLoop:
         return min(rest, LONGEST_WAIT, max(0.0, self._deadline - self._now))
 
     def _set_up_missing(self) -> None:
-        """Set up what was not yet: the tree, in the first run, or what is new in it."""
+        """Set up new nodes: the whole tree in the first run, inserted ones later."""
         tree = self.tree
         while not self._is_as_found():
             self._doing = "setup"
@@ -225,7 +228,7 @@ class TickLoop:
                     waiting += node.children
             by_itself = type(tree).setup is not BehaviourTree.setup and not self._nodes
             if by_itself:
-                tree.setup(timeout=Duration.INFINITE, node=self._node)  # and it does more than that
+                tree.setup(timeout=Duration.INFINITE, node=self._node)  # it may do more
             done = self._nodes | set(self._pruned)
             for node in reversed(nodes):  # children before their parents, as `iterate` has them
                 if node not in done:
@@ -239,12 +242,12 @@ class TickLoop:
             self.teller.added()
 
     def _is_as_found(self) -> bool:
-        """Whether the tree is as it was set up; takes about 10 ns a behaviour."""
+        """Return whether the tree is as it was set up; takes about 10 ns a behaviour."""
         found = self._with_children
         return self.tree.root in found and [n.children for n in found] == list(found.values())
 
     def _tick(self) -> bool:
-        """Tick once, and tell whether that changed a status."""
+        """Tick once; return whether a status changed."""
         dog = self.watchdog
         dog.seen, dog.ticks_since = False, self._traffic.host.steady()
         try:
@@ -268,12 +271,12 @@ class TickLoop:
 
     @property
     def _has_others(self) -> bool:
-        """Whether anybody else is called at each tick."""
+        """Whether a handler or another visitor is called at each tick."""
         tree = self.tree
         return bool(tree.pre_tick_handlers or tree.post_tick_handlers or len(tree.visitors) > 1)
 
     def _rests_for(self) -> float:
-        """Seconds until the next tick, where nothing happens before."""
+        """Return the seconds until the next tick without an event."""
         visitor = self._visitor
         watched = self._has_others or visitor.watching
         self.goals.is_watched = watched or bool(self._observers)
@@ -285,7 +288,7 @@ class TickLoop:
         return rest
 
     def _held(self) -> bool:
-        """Whether the tree is paused; carries a change of that over to goals not sent yet."""
+        """Return whether the tree is paused; carry a change of that over to unsent goals."""
         if self._pause_wanted != self._paused:
             self._paused = self._pause_wanted
             self.teller.stream.add(Paused, self._paused)
@@ -309,10 +312,10 @@ class TickLoop:
         error.culprit = culprit
         return error
 
-    # Its end
+    # The end of a run
 
     def _stop(self) -> Drain:
-        """Stop what still runs, and begin to drain; say why, where nobody has said it."""
+        """Stop running nodes, and begin to drain; tell the reason, where it was not told."""
         stream = self.teller.stream
         if self._status is Status.INVALID and self._error is None and not stream.stop_is_told:
             if self._stop_wanted:
@@ -334,7 +337,7 @@ class TickLoop:
         return Drain(self._traffic.host, self.goals.not_over)
 
     def _let_go(self, culprit: Behaviour | None) -> None:
-        """Stop what a terminate() that raised has kept from it."""
+        """Terminate nodes that a terminate() that raised has kept from it."""
         for node in self.tree.root.iterate():
             if node.status is Status.RUNNING:
                 try:
@@ -345,13 +348,13 @@ class TickLoop:
                 node.status = Status.INVALID
 
     def _wind_up(self, drain: Drain) -> Sleep | Done[Status]:
-        """Drain the tree's goals, and tell."""
+        """Drain the tree's goals, and tell the end."""
         step = drain.step(self._now, hurry=self._abandoned)
         self._tell_observers()
         if isinstance(step, Sleep):
             return step
         self._visitor.stopped()
-        self._log.flush()  # who tells of the end tells it last
+        self._log.flush()  # the end is told last
         self.teller.finished(self._status, self._error, self.goals.unaccounted)
         self._tell_observers()
         timed_out = self._status is Status.INVALID and not self._stop_wanted
@@ -362,7 +365,7 @@ class TickLoop:
         return Done(self._status)
 
     def raise_what_ended_it(self) -> None:
-        """Raise what has ended the run, or is to end the program, if anything has; once."""
+        """Raise, once, the error that has ended the run, or is to end the program, if any."""
         error, self._error = self._error, None
         try:
             if error is not None:
@@ -371,29 +374,29 @@ class TickLoop:
             del error
 
     def close(self) -> None:
-        """Tell what has only now become known of goals; nothing is told after that."""
+        """Tell late news of goals, and tell nothing after that."""
         self.goals.close()
         self._tell_observers()
 
     def shutdown(self) -> None:
-        """Shut down the tree, and what was pruned, if set up here: else another one may run it."""
+        """Shut down the tree, and pruned nodes, if set up here; else another loop may run it."""
         if not self._nodes:
             return
         nodes = list(self.tree.root.iterate())
         ours = [each for each in nodes if isinstance(each, ActionBehaviour)]
         left = {*self._nodes, *self._pruned}.difference(nodes)
-        pruned = [each for each in left if root_of(each) in left]  # and is in no other tree
+        pruned = [each for each in left if root_of(each) in left]  # and in no other tree
         for shutdown in self.tree.shutdown, *(each.shutdown for each in [*ours, *pruned]):
-            try:  # ours must let go though another one raises
+            try:  # our leaves must let go though another node raises
                 shutdown()
             except Exception as error:  # noqa: BLE001 - the user's: any
                 self._raised("shutdown of a behaviour raised", error)
         drain(self._traffic.host, self.goals.not_over)
 
-    # Who is told
+    # Observers
 
     def _tell_observers(self) -> None:
-        """Call each observer with what has happened; forget the goals that are over."""
+        """Call each observer with the new events; forget the goals that are over."""
         self.goals.forget()
         steady = self._traffic.host.steady
         for reader, observer in list(self._observers.items()):
@@ -401,7 +404,7 @@ class TickLoop:
                 began = steady()
                 try:
                     observer(event)
-                except BaseException as error:  # noqa: BLE001 - the run goes on without it
+                except BaseException as error:  # noqa: BLE001 - the run goes on without the observer
                     self.teller.stream.leave(reader)
                     self._observers.pop(reader, None)
                     self._raised("an observer raised and was removed", error)
@@ -414,7 +417,7 @@ class TickLoop:
                     )
 
     def _raised(self, what: str, error: BaseException) -> None:
-        """Log it, and end the run where it is meant to end the program, as SystemExit is."""
+        """Log an error, and end the run where it is to end the program, as SystemExit is."""
         self._log.error(f"{what}: {raised(error)}")
         if not isinstance(error, Exception):
             self._error = self._error or error

@@ -1,7 +1,7 @@
-"""Runs a tree to its end on a thread: the caller's in `run`, one of its own after `start`.
+"""The runner of a tree on a thread: the caller's in `run`, one of its own after `start`.
 
-Here are threads, signals, shutdown and the end of the process; what a run does at each moment is
-for running/loop.py. ROS comes in through wiring.py, when a runner is made.
+This file has threads, signals, shutdown and the end of the process; running/loop.py has the steps
+of a run. ROS comes in through wiring.py, when a runner is made.
 """
 
 from __future__ import annotations
@@ -32,33 +32,33 @@ from bt_actions.utilities.stepping import Done
 from bt_actions.utilities.suggest import listing
 
 PATIENCE_AT_EXIT = 30.0
-"""Seconds that a process that ends gives a run to end: a behaviour may block its tick for ever."""
+"""Seconds that an ending process gives a run to end: a behaviour may block its tick for ever."""
 
 
 _runs: set[TreeRunner] = set()
-"""All that go on in this process; a list of them can be made in a signal handler."""
+"""The runners with a run in this process; a signal handler can copy the set to a list."""
 _runs_change = threading.Condition()
 
 
 class TreeRunner:
-    """Runs one tree, on a node that is made here or on one that is given.
+    """A runner of one tree, on a node that is made here or on a given one.
 
     Args:
-        root_or_behaviour_tree: what to run; of a BehaviourTree, handlers and visitors are called.
-        node: to send goals from; without one, context, node and spin thread are made here. Runners
-            share them that give neither this nor any of what follows but `heartbeat`, and whose
-            trees have, when the runner is made, no class but those of bt_actions and py_trees. A
-            node that is in an executor is never spun here: its owner spins it.
+        root_or_behaviour_tree: the tree; handlers and visitors of a BehaviourTree are called.
+        node: the node to send goals from; without one, context, node and spin thread are made here.
+            Runners share them that give no argument but `heartbeat`, and whose trees have, when the
+            runner is made, no class but those of bt_actions and py_trees. A node that is in an
+            executor is never spun here: its owner spins it.
         executor: "multi" (the default), "single", or an executor; one without nodes is spun here.
-        heartbeat: seconds after which the tree is ticked though nothing has happened; 2 s or
-            more where what it ticked waits for goals alone, as only others watch the clock.
+        heartbeat: seconds between two ticks without an event; 2 s or more where the ticked nodes
+            wait for goals alone, as only others watch the clock.
         namespace: of the node that is made here.
-        name: of that node; one that no other has where it is left out.
-        context: for that node; it is shut down with it.
+        name: of that node; a name that no other node has where it is left out.
+        context: for that node; it is shut down with the node.
         asked_by: the id of the RunTree goal that the runs answer, and that of its caller's run.
 
-    Use it as a context manager, or call `shutdown` in the end. Not reentrant, but may run again:
-    the tree is set up once. It works in a callback of anybody else's executor.
+    Use a runner as a context manager, or call `shutdown` in the end. A runner is not reentrant, but
+    may run again: the tree is set up once. It works in a callback of any other executor.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class TreeRunner:
         self._on_close: list[Callable[[], None]] = []
         self._started: StartedRun | None = None
         self._runs_on: int | None = None
-        self._closed = False  # no run begins any more
+        self._closed = False  # True: no run begins any more
         self._shutting_down = threading.Lock()
         self._is_down = False
         self._pid = os.getpid()
@@ -131,7 +131,7 @@ class TreeRunner:
 
     @property
     def where(self) -> dict[str, str]:
-        """Where the runs are, as `RunBegan` tells; may be added to before a run."""
+        """The place of the runs, as `RunBegan` tells; may be added to before a run."""
         return self._loop.teller.where
 
     @property
@@ -150,11 +150,11 @@ class TreeRunner:
 
     @property
     def future(self) -> futures.Future[Status]:
-        """The status of the run that `start` began last, or what it raised.
+        """The status of the run that `start` began last, or its error.
 
         For add_done_callback, which is called on the tree's thread, where `shutdown` and the next
-        `start` are allowed, and for `asyncio.wrap_future`. To cancel it does nothing: `interrupt`
-        does. Raises RuntimeError before the first `start`.
+        `start` are allowed, and for `asyncio.wrap_future`. A cancel of the future does nothing:
+        `interrupt` ends a run. Raises RuntimeError before the first `start`.
         """
         if self._started is None:
             raise RuntimeError("the tree has not been started, so there is nothing to wait for")
@@ -163,16 +163,16 @@ class TreeRunner:
     def observe_events(self, callback: Observer) -> None:
         """Call `callback` with each event of a run, on the ticking thread.
 
-        What becomes known of its goals in `shutdown` is told there.
-        One that raises is removed, and the run goes on; SystemExit and the like end it, and are
-        raised again when its goals have been drained.
+        Late news of its goals is told in `shutdown`. An observer that raises is removed, and the
+        run goes on; SystemExit and the like end the run, and are raised again when its goals have
+        been drained.
         """
         self._loop.observe_events(callback)
 
     def on_close(self, callback: Callable[[], None]) -> None:
         """Call `callback` in `shutdown`, while nothing spins and the context still lives.
 
-        The place to destroy further nodes that were added to `executor`.
+        The callback is the place to destroy further nodes that were added to `executor`.
         """
         self._on_close.append(callback)
 
@@ -180,20 +180,20 @@ class TreeRunner:
         for callback in self._on_close:
             try:
                 callback()
-            except Exception as error:  # noqa: BLE001 - the rest must be closed all the same
+            except Exception as error:  # noqa: BLE001 - the others must be closed all the same
                 self._log.error(f"closing: {raised(error)}")
 
     # Running
 
     def run(self, timeout: float | None = None) -> Status:
-        """Run the tree until it succeeds or fails, and return which; INVALID when interrupted.
+        """Run the tree until it succeeds or fails, and return its status; INVALID when interrupted.
 
-        Raises TimeoutError after `timeout` seconds, TreeError when a behaviour raised or returned
-        no status, or the spin thread died (goals are drained first in each case), and RuntimeError
-        where the tree runs already, here or in another runner, where nobody spins the node, and on
-        the thread that has to: in a callback of the node's own executor use `start` and `future`.
-        On the main thread and with a node of its own, SIGINT, SIGTERM and SIGHUP take effect after
-        the goals were drained.
+        Raises TimeoutError after `timeout` seconds, and TreeError when a behaviour raised or
+        returned no status, or the spin thread died; goals are drained first in each case. Raises
+        RuntimeError where the tree runs already, here or in another runner, where nobody spins the
+        node, and on the thread that has to: in a callback of the node's own executor use `start`
+        and `future`. On the main thread and with a node of its own, SIGINT, SIGTERM and SIGHUP take
+        effect after the goals were drained.
         """
         if self._spinner.is_here():
             raise _waits_for_itself(
@@ -221,13 +221,13 @@ class TreeRunner:
         )
 
     def _hear_signals(self) -> contextlib.AbstractContextManager[None]:
-        """With a node of the user's, its context's signal handling is the user's as well."""
+        """Hear signals for our own node; a context of the user's has the user's signal handling."""
         if not self._spinner.owns_node:
             return contextlib.nullcontext()
         return wiring.ended_by_signals(self._signalled)
 
     def _signalled(self, again: bool, ends_process: bool) -> bool:
-        """Interrupt the run, and all of them before the process ends; tell whether ours cannot end.
+        """Interrupt the run, and all runs before the process ends; return whether ours cannot end.
 
         Called in a signal handler.
         """
@@ -238,21 +238,20 @@ class TreeRunner:
     def start(self) -> None:
         """Run the tree on a thread of its own; see `wait` and `future`. For use in callbacks.
 
-        A run that is started when this one is over may take over the thread, with what is kept for
-        it (`threading.local`).
+        A later run may take over the thread, with its `threading.local` data.
 
         Raises RuntimeError where the tree runs already, here or in another runner.
 
         A signal that ends the process while neither `wait` nor `shutdown` is on the main thread
-        ends it at once, as it does any program, and its goals run on: only SIGINT, which Python
-        turns into an exception, and what ends the main thread in good order, drains them.
-        What it raises is logged, too.
+        ends it at once, as it does any program, and its goals run on. Only SIGINT, which Python
+        turns into an exception, and an orderly end of the main thread drain them. An error of the
+        run is logged, too.
         """
         self._begin()
         before, self._started = self._started, StartedRun(self._run, self._log.error)
         try:
             self._started.start()
-        except RuntimeError:  # there can be no more threads
+        except RuntimeError:  # no more threads
             self._started = before
             self._release()
             raise
@@ -266,9 +265,9 @@ class TreeRunner:
     def wait(self, timeout: float | None = None) -> Status:
         """Wait for a tree that was started, and return or raise what `run` would.
 
-        Signals take effect as in `run` while this, or `shutdown`, is on the main thread.
-        Raises TimeoutError, which says what its goals do, when it is still running after `timeout`
-        seconds; it goes on. Raises RuntimeError before the first `start`, within the run, and,
+        Signals take effect as in `run` while this, or `shutdown`, is on the main thread. Raises
+        TimeoutError, with the states of its goals, when the tree is still running after `timeout`
+        seconds; the run goes on. Raises RuntimeError before the first `start`, within the run, and,
         without a `timeout`, where `run` does because of the thread.
         """
         check_seconds(timeout)
@@ -299,18 +298,18 @@ class TreeRunner:
     def interrupt(self, *, abandon: bool = False) -> None:
         """End the run: cancel and drain its goals. Returns at once; safe in a signal handler.
 
-        Before a run it makes that run return at once.
-
-        With `abandon`, stop waiting for goals that are being drained; `unaccounted` tells which.
+        An interrupt before a run makes that run return at once. `abandon` stops the wait for goals
+        that are being drained; `unaccounted` names them.
         """
         self._loop.interrupt(time.monotonic(), abandon=abandon)
 
     def shutdown(self) -> None:
-        """End the run if there is one, and shut down the tree and all that was made here.
+        """End a run, and shut down the tree and all that was made here.
 
-        What runners share goes with the last of them: what is put on their node stays until then.
-        Returns at once where another thread is at it. What an exception cuts short waits no longer.
-        Raises RuntimeError on a thread of an executor that is spun here, and within the run.
+        What runners share goes with the last of them: objects on their node stay until then.
+        Returns at once where another thread shuts down; what an exception cuts short waits no
+        longer. Raises RuntimeError on a thread of an executor that is spun here, and within the
+        run.
         """
         if self._is_down:
             return
@@ -332,11 +331,11 @@ class TreeRunner:
     def _shut_down(self, patience: float | None) -> None:
         """Shut down; where a run does not end within `patience` seconds, leave all as it is."""
         if os.getpid() != self._pid:
-            return  # the child of a fork: all of this is the parent's
+            return  # the child of a fork: the runner is the parent's
         self._closed = True
         atexit.unregister(self._at_exit)
         if not self._shutting_down.acquire(blocking=False):
-            return  # somebody else is at it
+            return  # another thread shuts down
         try:
             if self.running:
                 self.interrupt()
@@ -351,7 +350,7 @@ class TreeRunner:
                 last.callback(self._loop.close)
                 last.callback(self._spinner.stop, self._wake_up.set, guests)
                 self._loop.shutdown()
-            self._log.flush()  # what was said is written, whatever becomes of the process
+            self._log.flush()  # the lines are written, whatever becomes of the process
         finally:
             self._shutting_down.release()
 
@@ -360,7 +359,7 @@ class TreeRunner:
 
     def __exit__(self, error: object, *_: object) -> None:
         if error is None or not self._spinner.would_wait_for_itself():
-            self.shutdown()  # else what run() has said would be lost
+            self.shutdown()  # else the error of run() would be lost
 
     # A run
 

@@ -1,6 +1,6 @@
-"""What ROS sees of a run beside its goals: its inputs as parameters, and its life on `/rosout`.
+"""The view of ROS on a run beside its goals: inputs as parameters, and the run's life on `/rosout`.
 
-What is said on `/rosout` is printed by nothing here. Knows ROS by wiring.py alone.
+Nothing here prints a line. Knows ROS by wiring.py alone.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
 
 class ShownRun:
-    """Shows one run on its node, which `close` has to find alive."""
+    """The view of one run on its node; `close` must come while the node lives."""
 
     def __init__(self, runner: TreeRunner, root: Behaviour) -> None:
         self._runner = runner
-        self._state = State()  # of its own: the views' is read on the main thread
+        self._state = State()  # its own: the main thread reads the views'
         self._once = threading.Lock()
         for name, (each, value) in given_inputs(root).items():
-            if each.secret:  # which anybody could read, were it a parameter
+            if each.secret:  # a parameter is readable by all
                 continue
             unit = f" ({each.unit})" if each.unit else ""
             kind = parse_type(each.type)
@@ -52,7 +52,10 @@ class ShownRun:
             self._rosout.say("info", f"{event.tree} {begins_text(file, event.inputs)}")
 
     def close(self, *, left: bool = False, error: BaseException | None = None) -> None:
-        """Say how the run has ended; `left`: without waiting for its goals. Once is enough."""
+        """Say how the run has ended.
+
+        `left`: without a wait for its goals. A second call does nothing.
+        """
         if not self._once.acquire(blocking=False):
             return
         if self._state.began is None:

@@ -1,4 +1,4 @@
-"""Tells the events of a tree: who its nodes are, what becomes of them, how a run ends. No ROS."""
+"""The events of a tree: its nodes, their changes, and the end of a run. No ROS."""
 
 from __future__ import annotations
 
@@ -34,34 +34,38 @@ _ALL = sys.maxsize
 
 
 class TreeError(Exception):
-    """A behaviour raised or had no status, or the spin thread died; the goals have been drained."""
+    """A fault of a behaviour (an exception, no status), or of the spin thread.
+
+    Goals were drained.
+    """
 
     culprit: Behaviour | None = None
-    """The behaviour."""
+    """The behaviour at fault."""
 
 
 class UnusableTree(TreeError):
-    """The tree cannot be set up as it is given, whatever the world does."""
+    """A fault of the tree itself: its setup fails whatever the world does."""
 
 
 class TreeTeller(Teller):
-    """Tells what becomes of one tree, in one run after another."""
+    """The teller of one tree, in one run after another."""
 
     def __init__(self, tree: BehaviourTree, backend: Backend) -> None:
         self._tree, self._backend = tree, backend
         self._host = backend.traffic.host
         self._wall = self._host.wall
         self._has_begun = False
-        """Whether this run was told of."""
+        """Whether RunBegan of this run was told."""
         self._overhears = False
-        """Whether what clients of the blackboard write is told."""
+        """Whether writes of blackboard clients are told."""
         self._ros, self._asked, self._last = 0.0, -FINE, 0
         self._hidden: dict[Behaviour, str] = {}
-        """The latest messages of nodes that had read a secret: their parents may take them over."""
+        """The latest messages of nodes that had read a secret: their parents may take these
+        over."""
         self.asked_by = "", ""
         """The id of the RunTree goal that the runs answer, and that of its caller's run."""
         self.where: dict[str, str] = {}
-        """Where the runs are, as RunBegan tells."""
+        """The place of the runs, as RunBegan tells."""
         super().__init__(Stream(self._moment), self._host.steady)
 
     def _moment(self) -> tuple[float, float, float]:
@@ -73,9 +77,9 @@ class TreeTeller(Teller):
         return steady, self._wall(), self._ros
 
     def begin(self) -> None:
-        """Take note that a run begins, which is told of when its tree is set up."""
+        """Take note that a run begins; `began` tells it when the tree is set up."""
         unlike = hashlib.blake2b(self._host.new_goal_id(), digest_size=16)
-        self.run_id, self._has_begun = unlike.hexdigest(), False  # by its first letters, too
+        self.run_id, self._has_begun = unlike.hexdigest(), False  # also in its first letters
         self._overhears = self.is_heard
         if self._overhears:
             overhear()
@@ -87,12 +91,12 @@ class TreeTeller(Teller):
             overhear_less()
 
     def began(self) -> None:
-        """Tell that this run begins, with all its nodes, which get numbers anew."""
+        """Tell that this run begins, with all its nodes, which get new numbers."""
         self._has_begun, root = True, self._tree.root
         self.forget()
         if not self.is_heard:
             return
-        with self._host.lock:  # what comes for goals waits, so that RunBegan is the first
+        with self._host.lock:  # answers to goals wait, so that RunBegan is the first event
             self._tell_began(root)
 
     def _tell_began(self, root: Behaviour) -> None:
@@ -116,7 +120,7 @@ class TreeTeller(Teller):
         )
 
     def added(self) -> None:
-        """Tell of nodes that were inserted since the run began, and of those taken out."""
+        """Tell the nodes that were inserted since the run began, and those taken out."""
         if not (self._has_begun and self.is_heard):
             return
         nodes = list(in_order(self._tree.root))
@@ -127,7 +131,7 @@ class TreeTeller(Teller):
             self.stream.add(NodesAdded, new)
 
     def _new(self, nodes: Iterable[Behaviour], *, are_inserted: bool = False) -> tuple[Node, ...]:
-        """Give the nodes that have none their numbers; return what is told of them."""
+        """Number the nodes without a number; return their descriptions."""
         numbers, found = self.numbers, []
         for node in nodes:
             if node not in numbers:
@@ -139,7 +143,7 @@ class TreeTeller(Teller):
         return tuple(found)
 
     def changed(self, node: Behaviour) -> None:
-        """Tell the status that a node has now; on the ticking thread, as its tick returns."""
+        """Tell the present status of a node; on the ticking thread, as its tick returns."""
         if not self.is_heard:
             return
         message, status = node.feedback_message, node.status
@@ -161,7 +165,7 @@ class TreeTeller(Teller):
         self.tell(NodeChanged, node, status, message, by_itself, warning, due_in)
 
     def goes_on(self, node: Behaviour) -> None:
-        """Take note that a node that runs has been ticked."""
+        """Take note that a running node has been ticked."""
         if self.has_news:
             self.claim(node)
 
@@ -171,7 +175,7 @@ class TreeTeller(Teller):
         """Tell how the tree has ended."""
         if not self.is_heard:
             return
-        if not self._has_begun:  # it could not be set up
+        if not self._has_begun:  # the setup has failed
             self.began()
         self.all_written()
         outputs = document.tree_outputs(self._tree.root) if status is Status.SUCCESS else {}
@@ -191,12 +195,12 @@ class TreeTeller(Teller):
 
 
 def _is_over(node: object) -> bool:
-    """Whether nothing more will be told of a node that is in the tree no more."""
+    """Return whether no more events come of a node that is out of the tree."""
     return not isinstance(node, ActionBehaviour) or (node.drained and not node.draining)
 
 
 def where_raised(error: BaseException) -> str:
-    """Return one line about what ended a run, with the place in the user's code."""
+    """Return one line about the error that ended a run, with the place in the user's code."""
     cause = error.__cause__ or error
     frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)
     return f"{error} ({frames[-1].filename}:{frames[-1].lineno})" if frames else str(error)
@@ -204,7 +208,7 @@ def where_raised(error: BaseException) -> str:
 
 @lru_cache(maxsize=1)
 def _versions() -> dict[str, str]:
-    """Return the versions of what runs the tree."""
+    """Return the versions of the software that runs the tree."""
     found = {"python": platform.python_version()}
     for package in ("bt_actions", "py_trees", "rclpy"):
         try:

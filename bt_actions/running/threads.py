@@ -1,4 +1,4 @@
-"""What a runner's threads need: the one that a started run has, and what they sleep on."""
+"""The threads of a runner: one for a started run, and the object that a thread sleeps on."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from py_trees.common import Status
 from bt_actions.utilities.plain_text import raised
 
 LINGER = 5.0
-"""Seconds that a thread waits for another run: to start one takes as long as to send a goal."""
+"""Seconds that a thread waits for another run: a new thread takes as long as the send of a goal."""
 
 
 _AT_REST = "bt_actions-rest"
 _at_rest: list[queue.SimpleQueue[Callable[[], None]]] = []
-"""What threads without a run wait at."""
-os.register_at_fork(after_in_child=_at_rest.clear)  # they are the parent's
+"""The queues of threads without a run."""
+os.register_at_fork(after_in_child=_at_rest.clear)  # the threads are the parent's
 
 
 def _work(given: queue.SimpleQueue[Callable[[], None]]) -> None:
-    """Do one thing after another, and end after a while in which nobody had any."""
+    """Do one job after another, and end after a while without one."""
     while True:
         try:
             given.get(timeout=LINGER)()
         except queue.Empty:
-            with contextlib.suppress(ValueError):  # somebody has just taken it
+            with contextlib.suppress(ValueError):  # a run has just taken the queue
                 return _at_rest.remove(given)
         else:
             _at_rest.append(given)
 
 
 class StartedRun:
-    """A run on a thread that has no other meanwhile."""
+    """A run on a thread that has no other run meanwhile."""
 
     def __init__(self, work: Callable[[], Status], tell: Callable[[str], None]) -> None:
-        """`work` is called on that thread; `future` has what came of it, and `tell` what it raised.
+        """Make a run; `work` is called on the thread, `future` has its result.
 
-        So that this is known where nobody asks the future.
+        `tell` gets the error of `work`, so that an error is known where nobody asks the future.
         """
         self._work, self._tell = work, tell
         self._thread: threading.Thread | None = None
@@ -52,7 +52,7 @@ class StartedRun:
         self.future.set_running_or_notify_cancel()
 
     def start(self) -> None:
-        """Begin; raises RuntimeError where there can be no more threads."""
+        """Begin; raises RuntimeError where no more threads are possible."""
         run = partial(contextvars.Context().run, self._run)
         try:
             _at_rest.pop().put(run)
@@ -62,7 +62,7 @@ class StartedRun:
             threading.Thread(target=_work, args=[given], name=_AT_REST, daemon=True).start()
 
     def join(self) -> None:
-        """Wait until all done callbacks have returned; not in one of them."""
+        """Wait until all done callbacks have returned; within one of them, return at once."""
         if self._thread is not threading.current_thread():
             self._over.wait()
 
@@ -71,7 +71,7 @@ class StartedRun:
         thread.name = "bt_actions-tree"
         try:
             status = self._work()
-        except BaseException as error:  # noqa: BLE001 - raised again by who waits for it
+        except BaseException as error:  # noqa: BLE001 - raised again by the future
             self._tell(f"the tree that was started raised {raised(error)}")
             self.future.set_exception(error)
         else:
@@ -82,20 +82,23 @@ class StartedRun:
 
 
 class WakeUp:
-    """Ends one thread's sleep; wake-ups that come before it coalesce."""
+    """The end of one thread's sleep; wake-ups before the sleep coalesce."""
 
     def __init__(self) -> None:
         self._queue = queue.SimpleQueue[None]()  # put() is safe in a handler
         self._is_set = False
 
     def set(self) -> None:
-        """Wake it, or keep it from its next sleep; on any thread, and in a signal handler."""
+        """Wake the thread, or keep it from its next sleep.
+
+        On any thread, and in a signal handler.
+        """
         if not self._is_set:
             self._is_set = True
             self._queue.put(None)
 
     def sleep(self, seconds: float) -> None:
-        """Sleep for so long, unless something wakes this thread."""
+        """Sleep for so long, or until a wake-up."""
         with contextlib.suppress(queue.Empty):
             self._queue.get(seconds > 0.0, seconds)
         self._is_set = False

@@ -1,4 +1,4 @@
-"""One tick of a tree: what it has changed, and what a behaviour did wrong in it. No ROS."""
+"""One tick of a tree: the changes that it made, and the faults of a behaviour in it. No ROS."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from py_trees.visitors import VisitorBase
 from bt_actions.behaviours.action import ActionBehaviour
 
 QUIET_REST = 2.0
-"""Seconds until a tree is ticked in which nothing watches the clock; a longer heartbeat counts."""
+"""Seconds between two ticks of a tree in which nothing watches the clock; a longer heartbeat
+counts."""
 _PASS_ON = {
     composites.Sequence,
     composites.Selector,
@@ -23,16 +24,16 @@ _PASS_ON = {
     decorators.SuccessIsFailure,
     decorators.OneShot,
 }
-"""Classes of py_trees that make their status of that of their children, and look at nothing else.
+"""Classes of py_trees whose status follows from that of their children alone.
 
-One of ours says so of itself by `passes_on`; a class that is made of it may look at more.
+A class of ours says so by `passes_on`; a subclass of it may look at more.
 """
 
 
 def tick_once(tree: BehaviourTree, changes: ChangeVisitor) -> None:
-    """Tick as `BehaviourTree.tick` does, which walks the whole tree even for no visitor.
+    """Tick as `BehaviourTree.tick` does, without its walk through the whole tree for no visitor.
 
-    That is most of the time in a large tree of which little runs (docs/performance.md, row 6).
+    The walk is most of the time in a large tree of which little runs (docs/performance.md, row 6).
     """
     if type(tree).tick is not BehaviourTree.tick or any(each.full for each in tree.visitors):
         tree.tick()
@@ -50,7 +51,7 @@ def tick_once(tree: BehaviourTree, changes: ChangeVisitor) -> None:
 
 
 class Misbehaviour(Exception):
-    """What a behaviour did wrong without raising anything."""
+    """A fault of a behaviour that raised nothing."""
 
     def __init__(self, behaviour: Behaviour, what: str) -> None:
         super().__init__(what)
@@ -58,7 +59,7 @@ class Misbehaviour(Exception):
 
 
 class ChangeVisitor(VisitorBase):
-    """Collects which behaviours have another status than before, and which run."""
+    """The collector of behaviours with a new status, and of running ones."""
 
     def __init__(
         self,
@@ -67,18 +68,18 @@ class ChangeVisitor(VisitorBase):
         tell: Callable[[Behaviour], None] = lambda behaviour: None,
         settle: Callable[[Behaviour], None] = lambda behaviour: None,
     ) -> None:
-        """`before` is called between the handlers of a tick and its first behaviour.
+        """Make the visitor; `before` is called between a tick's handlers and its first behaviour.
 
-        `after_each` is called when a behaviour has ticked, and what it returns is its misbehaviour.
-        `tell` is called then, where its status is another or its visit ends, and for what was
-        stopped; `settle` for each that goes on running.
+        `after_each` is called when a behaviour has ticked, and returns a fault of it. `tell` is
+        called then, where its status is new or its visit ends, and for stopped behaviours; `settle`
+        for each that goes on running.
         """
         super().__init__(full=False)
         self._before, self._after_each, self._tell = before, after_each, tell
         self._settle = settle
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
-        self._kinds = {Behaviour}  # of what was visited: anything, for a tree that shows nothing
+        self._kinds = {Behaviour}  # of visited nodes; any class, for a tree that shows nothing
         self._asking: list[Callable[[], bool]] = []  # whether they ask at each tick
         self._known: dict[Behaviour, Status] = {}  # at the last tick of each
         self._live: dict[Behaviour, None] = {}  # told of as RUNNING
@@ -96,8 +97,8 @@ class ChangeVisitor(VisitorBase):
     def follow(self, ticked: Iterable[Behaviour], others: Collection[VisitorBase] = ()) -> None:
         """Take note of each behaviour as it has been ticked, behind the `others`.
 
-        Raises Misbehaviour, also where it has no status: py_trees makes INVALID of what is none,
-        and goes on with its parent. Nothing else leaves that after a tick.
+        Raises Misbehaviour, also for a behaviour without a status: py_trees makes INVALID of what
+        is none, and goes on with its parent. After a tick, no other behaviour is INVALID.
         """
         after_each, visited, none = self._after_each, self._visited, Status.INVALID
         live, running, tell, settle = self._live, Status.RUNNING, self._tell, self._settle
@@ -127,7 +128,7 @@ class ChangeVisitor(VisitorBase):
                 raise Misbehaviour(behaviour, wrong)
 
     def forget_others(self, tree: set[Behaviour]) -> None:
-        """Forget what is in the tree no more, unless its end has still to be told."""
+        """Forget nodes that are out of the tree, unless their end has still to be told."""
         self._known = {node: status for node, status in self._known.items() if node in tree}
 
     def finish(self) -> bool:
@@ -140,7 +141,7 @@ class ChangeVisitor(VisitorBase):
         return self._changed
 
     def stopped(self) -> None:
-        """Tell of what runs no more though it was not ticked."""
+        """Tell the nodes that have stopped running without a tick."""
         for node in [each for each in self._live if each.status is not Status.RUNNING]:
             del self._live[node]
             self._known.pop(node, None)
@@ -149,7 +150,7 @@ class ChangeVisitor(VisitorBase):
 
     @property
     def watching(self) -> bool:
-        """Whether any that was ticked may watch what tells nobody, as the clock or a variable."""
+        """Whether a ticked node may watch a source without events: the clock, or a variable."""
         if any(asks() for asks in self._asking):
             return True
         ours = ActionBehaviour.tick, ActionBehaviour.update
@@ -160,7 +161,7 @@ class ChangeVisitor(VisitorBase):
 
     @property
     def may_go_on(self) -> bool:
-        """Whether another tick, at once, may do more: an action's leaf waits for what comes."""
+        """Whether another tick, at once, may do more: an action's leaf waits for arrivals."""
         return self.watching or not all(
             isinstance(node, ActionBehaviour) or getattr(node, "memory", False)
             for node in self._visited
@@ -168,7 +169,7 @@ class ChangeVisitor(VisitorBase):
 
     @property
     def timed(self) -> list[Callable[[], object]]:
-        """`due_in` of those that run and have one (ActionBehaviour.due_in)."""
+        """`due_in` of the running nodes that have one (ActionBehaviour.due_in)."""
         timed = {kind for kind in self._kinds if callable(getattr(kind, "due_in", None))}
         running = (n for n in self._visited if n.status is Status.RUNNING) if timed else ()
         return [getattr(n, "due_in") for n in running if type(n) in timed]  # noqa: B009

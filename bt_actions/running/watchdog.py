@@ -1,7 +1,9 @@
-"""Looks at a run from the alarm's thread: at a tick that lasts, and at one that was to be the last.
+"""The watchdog of a run, on the alarm's thread.
 
-While a behaviour does not return from its tick, nobody else can stop the tree, or tell of it. Run
-beside the endpoints; has no thread of its own.
+It sees a tick that lasts, or that was to be the last.
+
+While a behaviour does not return from its tick, no other code can stop the tree, or tell its state.
+The watchdog is run beside the endpoints, and has no thread of its own.
 """
 
 from __future__ import annotations
@@ -21,54 +23,55 @@ from bt_actions.traffic.traffic import Traffic
 GRACE = 1.0
 """Seconds for a tick to return when the tree is to end."""
 LASTS = 1.0
-"""Seconds from which on the tick of a node is told of."""
+"""Seconds after which the tick of a node is told."""
 LOOK = 0.2
 """Seconds between two looks."""
 
 
 class Watchdog:
-    """Guards one tree's runs, one after another."""
+    """The guard of one tree's runs, one after another."""
 
     def __init__(self, traffic: Traffic, goals: RunGoals, teller: TreeTeller) -> None:
         self._traffic, self._host, self._goals = traffic, traffic.host, goals
         self._teller = teller
         self.ends_at = math.inf
-        """When the run is to end (seconds, steady clock); an interrupt makes it earlier."""
+        """The moment at which the run is to end (seconds, steady clock); an interrupt makes it
+        earlier."""
         self.ticks_on: int | None = None
-        """The thread, until the last tick is over and what behaviours do when they are stopped."""
+        """The thread of the run; None after the last tick and the stops that follow it."""
         self.gave_up = False
-        """Whether it was so in this run: what the tree says since is of no account."""
+        """Whether the watchdog gave up in this run: later words of the tree do not count."""
         self.ticks_since: float | None = None
-        """When the present tick of the tree began (seconds, steady clock), or within it the tick
-        of a node returned that was seen; None between ticks."""
+        """The beginning of the tree's present tick (seconds, steady clock), or the return of a
+        seen node's tick within it; None between ticks."""
         self.seen = False
         """Whether the present tick of one node was seen."""
         self._lasting: Behaviour | None = None
-        """Whose tick was told to last."""
+        """The node whose tick was told to last."""
         self._sees_ticks = False
 
     def begin(self, ends_at: float) -> None:
-        """A run begins on this thread, which is to end at `ends_at` (seconds, steady clock)."""
+        """Begin a run on this thread, which is to end at `ends_at` (seconds, steady clock)."""
         self.ticks_on, self.ends_at, self.gave_up = threading.get_ident(), ends_at, False
 
     def see_ticks(self) -> None:
-        """Look at the ticks of the run, wanted goals or not."""
+        """Look at the ticks of the run, with or without wanted goals."""
         self._sees_ticks = True
         with self._host.lock:
             self._host.scheduler.add(self)
 
     def is_overdue(self, now: float) -> bool:
-        """Whether the last tick should have been over for long; safe in a signal handler."""
+        """Return whether the last tick should have been over for long; safe in a signal handler."""
         return self.ticks_on is not None and now - self.ends_at >= GRACE
 
     def gives_up(self) -> bool:
-        """Whether nobody waits for the rest of this thread's tick any more."""
+        """Return whether the rest of this thread's tick is waited for no longer."""
         if self.is_overdue(self._host.steady()) and not self._goals.wanted:
-            self._give_up()  # else it is for `run_due`, which bears with stalls
+            self._give_up()  # else `run_due` decides, which bears with stalls
         return self.gave_up
 
     def tick_returned(self) -> None:
-        """Take note that a node's tick is over that was seen."""
+        """Take note that a node's seen tick is over."""
         with self._host.lock:
             now, since = self._host.steady(), self.ticks_since
             if since is not None:
@@ -76,10 +79,10 @@ class Watchdog:
             self._lasting, self.seen, self.ticks_since = None, False, now
 
     def run_due(self, now: float) -> float:
-        """Tell what lasts, and feedback that came too soon; cancel what an overdue tick leaves.
+        """Tell lasting ticks and late feedback; cancel the goals of an overdue tick.
 
-        Returns the seconds until a look. Is run no more where no goal is wanted and no tick is to
-        be seen, until it is scheduled again.
+        Returns the seconds until a look. Without wanted goals, and without ticks to see, the
+        watchdog takes itself off the schedule.
         """
         wanted = self._goals.wanted
         self._goals.tell_feedback()
@@ -93,8 +96,8 @@ class Watchdog:
         return LOOK
 
     def _see(self, now: float) -> None:
-        """Tell, once, whose tick has not returned for long."""
-        since = self.ticks_since  # which the ticking thread sets without the lock
+        """Tell, once, the node whose tick has not returned for long."""
+        since = self.ticks_since  # the ticking thread sets it without the lock
         if since is None or self._lasting is not None:
             return
         if not self.seen:
@@ -109,7 +112,7 @@ class Watchdog:
             self._teller.stream.add(TickLasts, number, now - since, is_over)
 
     def _give_up(self) -> None:
-        """Warn, and name the innermost behaviour that the ticking thread is in; once."""
+        """Warn, once, with the innermost behaviour that the ticking thread is in."""
         if not self.gave_up:
             self.gave_up, inside = True, self._innermost()
             stuck = "the tree" if inside is None else "/".join(path_of(inside))
