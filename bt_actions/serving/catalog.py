@@ -1,8 +1,8 @@
-"""The trees that can be run, by name: looked up in named folders, never opened by a path. No ROS.
+"""The catalog of trees by name: looked up in named folders, never opened by a path. No ROS.
 
-A file that changed is read again when somebody asks. One that no longer checks keeps its last good
-version; so does one that cannot be read soon, which is not waited for again before it has been.
-All files of a tree must lie in the named folders, or be linked there.
+A changed file is read again at the next question. A file that no longer checks keeps its last good
+version. A file that cannot be read soon keeps it, too, and is not waited for again before it has
+been read. All files of a tree must lie in the named folders, or be linked there.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.suggest import did_you_mean
 
 _LONGEST_NAME = 60
-"""Characters of a name that nobody knows in what is said of it."""
+"""Characters of an unknown name in a message."""
 PATIENCE = 2.0
 """Seconds in which a file or a folder must be read: less than a client waits for its answer."""
 AT_START = 5.0
-"""The same when the trees are read first, and much is imported for them."""
+"""The same for the first read of the trees, which imports much."""
 RACY = 1_000_000_000
 """Nanoseconds in which two changes of a file may have the same time of change."""
 _NOT_READ = (
@@ -40,7 +40,7 @@ _Stamp = tuple[int, int, int] | None
 
 
 class FileState(enum.Enum):
-    """How the file of a tree stands."""
+    """The state of a tree's file."""
 
     OK = 0
     KEPT_LAST_GOOD = 1
@@ -54,29 +54,32 @@ class ServedTree:
     name: str
     file: Path
     tree: Tree | None
-    """The latest version that checks; None where there was none."""
+    """The latest version that checks; None without one."""
     digest: str
     findings: tuple[Mistake, ...]
-    """The mistakes in the file as it is now."""
+    """The mistakes in the present file."""
     stamps: Mapping[Path, _Stamp]
     hides: tuple[Path, ...] = ()
     """Files of the same name that are not served."""
 
     @property
     def state(self) -> FileState:
-        """Whether its file checks, and if not, whether an older version is kept."""
+        """The state of its file.
+
+        Whether it checks, and if not, whether an older version is kept.
+        """
         if not self.findings:
             return FileState.OK
         return FileState.INVALID if self.tree is None else FileState.KEPT_LAST_GOOD
 
 
 class Catalog:
-    """The trees in some folders. May be asked on any thread.
+    """The trees in some folders, for questions on any thread.
 
     Args:
-        folders: where trees lie as NAME.yaml; of two of one name the first counts. No entry have
-            files without a tree (they are for others to import), those whose names begin with a
-            dot (of editors, say), and those with a name that no line shows.
+        folders: where trees lie as NAME.yaml; of two of one name the first counts. Files without a
+            tree (which others import), files whose names begin with a dot (of editors, say), and
+            files with a name that no line shows have no entry.
         python: the packages whose classes a ``python:`` node may name.
 
     Raises NotADirectoryError for a folder that is none.
@@ -124,7 +127,7 @@ class Catalog:
     def check(self, name: str, inputs: str) -> tuple[ServedTree, Tree, Mapping[str, object]]:
         """Return the tree that a goal would run, as it is now, and the values of its inputs.
 
-        Raises GoalRefused, which says what is wrong.
+        Raises GoalRefused, with the reason.
         """
         entry = self.find(name)
         if entry.tree is None:
@@ -154,20 +157,20 @@ class Catalog:
         return found
 
     def _same(self, file: Path, other: Path) -> bool:
-        """Return whether a file is another by a second path, as far as anybody can tell."""
+        """Return whether two paths lead to one file, as far as the disks tell."""
         with contextlib.suppress(OSError):  # TimeoutError is one
             return self._patience((file, other), partial(file.samefile, other))
         return False
 
     def _entry(self, name: str, files: Sequence[Path]) -> ServedTree | None:
-        """Return the entry of the first of some files that holds a tree, as it is now."""
+        """Return the entry of the first of these files that holds a tree, as it is now."""
         before = self._entries.get(name)
         for number, file in enumerate(files):
             known = before if before is not None and before.file == file else None
             there = tuple(self._there)
             try:
                 if file.parent not in there:
-                    raise TimeoutError  # as its folder
+                    raise TimeoutError  # as for its folder
                 entry = self._patience(file, partial(self._read, name, file, known, there))
             except TimeoutError:
                 said = Mistake("BT100", _NOT_READ, str(file))
@@ -183,7 +186,7 @@ class Catalog:
     ) -> ServedTree | None:
         """Return the entry of a file, or None for one that holds no tree.
 
-        May hang, so it changes nothing; `there` are the folders that answer.
+        The read may hang, so it changes nothing; `there` are the folders that answer.
         """
         if before is not None and not before.findings and _unchanged(before.stamps):
             return before
@@ -220,7 +223,7 @@ def _said(finding: Finding) -> Mistake:
 
 
 def _stamp(path: Path, *, before: int | None = None) -> _Stamp:
-    """Return what identifies a version of a file; None where it is missing, or too new.
+    """Return the identity of a file's version; None where the file is missing, or too new.
 
     A file that is not older than `before` may change again without another time of change.
     """

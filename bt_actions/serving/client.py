@@ -1,4 +1,4 @@
-"""Servers of trees in sight, asked from outside: which trees, why a goal was rejected, and control.
+"""The client of servers of trees in sight: their trees, their rejections, and control.
 
 All of it blocks for some seconds.
 """
@@ -17,7 +17,7 @@ from bt_actions.utilities.suggest import listing
 
 
 class NotControlled(Exception):
-    """Nothing was done. `unclear`: because it is not clear which run is meant."""
+    """A command that was not carried out. `unclear`: the run that is meant is not clear."""
 
     def __init__(self, message: str, *, unclear: bool = False) -> None:
         super().__init__(clean(message))
@@ -25,7 +25,7 @@ class NotControlled(Exception):
 
 
 def control(action: str, command: str, beginning: str) -> str:
-    """Have a server pause, resume or halt the run whose id begins so; return which it is.
+    """Have a server pause, resume or halt the run whose id begins so; return the name of that run.
 
     `action` is its full name; without a beginning, the one run there is. Raises NotControlled.
     """
@@ -78,7 +78,7 @@ def _chosen(action: str, runs: dict[str, str], beginning: str) -> str:
 
 
 def why_rejected(goal_name: str) -> Rejection | None:
-    """Return the first rejection of a goal of this name that any server in sight tells of."""
+    """Return the first rejection of a goal of this name from any server in sight."""
     with asking() as asker:
         rejections = asker.heard(Rejection, REJECTIONS)
         return next((each for each in rejections if each.goal_name == goal_name), None)

@@ -1,4 +1,4 @@
-"""Pause, resume or halt a run, for whoever asks by its goal's id: the service ~/control_tree."""
+"""The service ~/control_tree: pause, resume or halt a run, by its goal's id."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ COMMANDS = {
 
 
 class Control:
-    """Answers one request at a time.
+    """The service, which answers one request at a time.
 
     Args:
         goals: returns the goals that run or wait, by their ids.
         halt: ends one of them.
-        say: says of one of them what is done with it.
+        say: logs a line about one of them.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class Control:
     def answer(
         self, request: ControlTree.Request, response: ControlTree.Response
     ) -> ControlTree.Response:
-        """Do what is asked for, or say why not; the callback of the service."""
+        """Carry out the request, or refuse it with a reason; the callback of the service."""
         goals = self._goals()
         goal_id = bytes(request.goal_id.uuid)
         goal = goals.get(goal_id)

@@ -1,4 +1,4 @@
-"""How each served tree stands, on /diagnostics once a second. Changes nothing."""
+"""The state of each served tree, on /diagnostics once a second. Changes nothing."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ from bt_actions.story.state import State
 from bt_actions.story.why import waits
 
 PERIOD = 1.0
-"""Seconds."""
+"""Seconds between two messages."""
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
 
 class TreeStanding(NamedTuple):
-    """A tree, and what runs of it and has run."""
+    """The standing of a tree: its file, its runs, and its last run."""
 
     tree: str
     state: FileState = FileState.OK
     running: int = 0
     paused: int = 0
-    """Of those that run."""
+    """The number of running ones that are paused."""
     retrying: bool = False
     doing: tuple[str, ...] = ()
     """A line for each leaf that runs."""
     last: RunOutcome | None = None
-    """How its last run ended."""
+    """The outcome of its last run."""
 
     def beside(self, run: State, *, paused: bool) -> TreeStanding:
-        """Return it with one more run."""
+        """Return the standing with one more run."""
         return self._replace(
             running=self.running + 1,
             paused=self.paused + paused,
@@ -46,7 +46,7 @@ class TreeStanding(NamedTuple):
 
 
 def judge(standing: TreeStanding, refuses: str) -> tuple[bytes, str]:
-    """Return the level of a tree, and why; `refuses` says why its server accepts nothing."""
+    """Return the level of a tree, and the reason; `refuses` is why its server accepts nothing."""
     last, running = standing.last, standing.running
     if refuses:
         return ERROR, f"not serving: {refuses}"
@@ -66,10 +66,10 @@ def judge(standing: TreeStanding, refuses: str) -> tuple[bytes, str]:
 
 
 class Diagnostics:
-    """Publishes what `look` returns: how the trees stand, and why the server accepts nothing.
+    """The publisher of `look`: the standings of the trees, and why the server accepts nothing.
 
-    `look` is called by what `submit` submits it to, not on the executor's threads. A server that
-    `yields` to another, which may have a node of the same name, has its process in the names.
+    `submit` runs `look`, on other threads than the executor's. A server that `yields` to another,
+    which may have a node of the same name, has its process in the names.
     """
 
     def __init__(

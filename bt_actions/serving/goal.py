@@ -1,4 +1,4 @@
-"""One accepted goal: its client, its run, and what its client has heard of it. Ends nothing."""
+"""One accepted goal: its client, its run, and the feedback so far. Ends nothing."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bt_actions.serving.messages import feedback
 from bt_actions.serving.run import Run
 
 FASTEST, SLOWEST = 0.1, 1.0
-"""Seconds between two messages of feedback: where something has changed, and where nothing has."""
+"""Seconds between two messages of feedback: after a change, and without one."""
 
 
 @dataclass(slots=True, eq=False)
@@ -17,19 +17,19 @@ class ServedGoal:
     """A goal that runs, or waits for its turn."""
 
     client: Any
-    """rclpy's handle of it."""
+    """rclpy's handle of the goal."""
     run: Run
     tree: str
     begins: str = ""
     """The line in the log when the goal begins."""
     begun_at: float | None = None
-    """When it began, on the steady clock; None while it waits for its turn."""
+    """The moment of its beginning, on the steady clock; None while it waits for its turn."""
     _told: int = -1
     _told_at: float = 0.0
 
     @property
     def id(self) -> bytes:
-        """Its goal id."""
+        """The goal id."""
         return bytes(self.client.goal_id.uuid)
 
     @property
@@ -39,11 +39,11 @@ class ServedGoal:
 
     @property
     def label(self) -> str:
-        """A name that sets its run apart from others of the tree."""
+        """A name that tells its run from other runs of the tree."""
         return f"{self.tree} {self.id.hex()}"
 
     def tell(self, now: float) -> None:
-        """Tell its client how far it is; to be called every FASTEST seconds."""
+        """Send feedback to its client, if it is time; to be called every FASTEST seconds."""
         with self.run.told() as state:
             changes = state.changes
         if changes != self._told or now - self._told_at >= SLOWEST - FASTEST / 2:

@@ -21,7 +21,7 @@ from bt_actions.story.state import NodeStory, State
 from bt_actions.utilities.plain_text import as_json
 
 SHOWN = 3
-"""Running leaves that are told of."""
+"""Running leaves in a message of feedback."""
 
 
 def result(outcome: RunOutcome) -> RunTree.Result:
@@ -36,7 +36,7 @@ def result(outcome: RunOutcome) -> RunTree.Result:
 
 
 def feedback(run: Run, *, begun: bool) -> RunTree.Feedback:
-    """Return how far a run is."""
+    """Return the progress of a run."""
     with run.told() as state:
         return RunTree.Feedback(
             running=[_leaf(state, each) for each in state.running[:SHOWN]],
@@ -55,12 +55,12 @@ def _leaf(state: State, story: NodeStory) -> RunningLeaf:
 
 
 def finding(said: Mistake) -> Finding:
-    """Return one thing that is wrong."""
+    """Return a mistake as a message."""
     return Finding(**said._asdict())
 
 
 def info(entry: ServedTree, goals: Iterable[tuple[UUID, Run, bool]]) -> TreeInfo:
-    """Return a tree, and of each of its goals the run, and whether that has begun."""
+    """Return a tree; each of its goals comes with its run, and whether that has begun."""
     tree, goals = entry.tree, list(goals)
     return TreeInfo(
         name=entry.name,

@@ -1,7 +1,7 @@
-"""How a run is told to others: codes, why it failed, a report for each action. No ROS.
+"""The outcome of a run for others: its code, its reason, a report for each action. No ROS.
 
-The numbers are those of bt_actions_interfaces (RunTree.action, ActionReport.msg), which say what
-they mean.
+The numbers are those of bt_actions_interfaces (RunTree.action, ActionReport.msg), which define
+them.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from bt_actions.story.why import why_text
 from bt_actions.utilities.plain_text import clean
 
 SEPARATOR = " / "
-"""Between the names of a path."""
+"""The text between the names of a path."""
 _MOST_TEXT = 4000
 """Characters of an error_msg."""
 
 
 class Code(enum.IntEnum):
-    """Why a run did not succeed."""
+    """The reason why a run did not succeed, as a number."""
 
     NONE = 0
     UNKNOWN = 20000
@@ -63,16 +63,16 @@ class RunOutcome:
 
     code: int
     why: str = ""
-    """Why it did not succeed; the first line has the root cause."""
+    """The reason of a failure; the first line has the root cause."""
     outputs: str = "{}"
     unaccounted: tuple[str, ...] = ()
     actions: tuple[ActionStory, ...] = ()
     at: float = 0.0
-    """When the run ended, in seconds on the steady clock."""
+    """The moment of the run's end, in seconds on the steady clock."""
 
     @property
     def message(self) -> str:
-        """Why it did not succeed, and what is left of it."""
+        """The reason of a failure, and the goals that may still run."""
         left = [f"may still be running: {each}" for each in self.unaccounted]
         return "\n".join([*filter(None, [self.why]), *left])[:_MOST_TEXT]
 
@@ -83,7 +83,7 @@ class RunOutcome:
 
     @property
     def as_wanted(self) -> bool:
-        """Whether it is settled, and succeeded or was ended by somebody."""
+        """Whether the run is settled, and succeeded or was ended on request."""
         return self.settled and self.code in (Code.NONE, *(each.value[0] for each in Ending))
 
 
@@ -115,7 +115,7 @@ def outcome_of(
 
 
 def _code_of(state: State) -> int:
-    """The code of the first action that is to blame, if one is."""
+    """Return the code of the first action that is to blame, or TREE_FAILED."""
     for each in state.failures:
         if each.action is not None and each.action.outcome is not None:
             return Code.ACTION_FAILED + OUTCOMES[each.action.outcome]

@@ -1,4 +1,4 @@
-"""Why goals were rejected, told to all: ROS gives a rejection no reason. Decides nothing."""
+"""The reasons of rejections, told to all: ROS gives a rejection no reason. Decides nothing."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bt_actions.utilities.plain_text import clean
 
 REJECTIONS = 10
 ECHO = 200
-"""Characters of a client's own words in what is said of it."""
+"""Characters of a client's own words in a message about them."""
 
 
 class Rejections:
@@ -24,7 +24,7 @@ class Rejections:
         self._publisher = endpoints.publisher(Rejection, "~/rejections", kept(REJECTIONS))
 
     def tell(self, goal: RunTree.Goal, refused: GoalRefused) -> None:
-        """Say why a goal is rejected."""
+        """Tell why a goal is rejected."""
         said = refused.finding
         place = f" ({said.place})" if said.place else ""
         called = f", called {clean(goal.goal_name)[:ECHO]!r}," if goal.goal_name else ""

@@ -1,6 +1,6 @@
 """The inputs of a RunTree goal: a text from a stranger, read within bounds. No ROS.
 
-Nothing in it is computed, and no file is read: a dollar sign and an @ mean themselves.
+Nothing in the text is computed, and no file is read: a dollar sign and an @ mean themselves.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from bt_actions.document.yaml.nodes import data_of
 from bt_actions.utilities.plain_text import clean
 
 MAX_BYTES = 256 * 1024
-"""Of a goal's `inputs`, in UTF-8."""
+"""Bytes of a goal's `inputs`, in UTF-8."""
 _LONGEST = 1000
-"""Characters of a reason: it may quote what it is about."""
+"""Characters of a reason, which may quote the text."""
 
 
 class GoalRefused(Exception):
-    """A goal is not accepted. `code` is a rule's (BT104), or a word in capitals."""
+    """A refusal of a goal. `code` is a rule's (BT104), or a word in capitals."""
 
     def __init__(self, code: str, message: str, place: str = "") -> None:
         said = clean(message)
@@ -32,7 +32,7 @@ class GoalRefused(Exception):
 
 
 class Mistake(NamedTuple):
-    """One thing that is wrong, as a Finding message has it."""
+    """One mistake, with the fields of a Finding message."""
 
     code: str
     message: str
@@ -40,7 +40,7 @@ class Mistake(NamedTuple):
 
 
 def inputs_of(text: str) -> Mapping[str, object]:
-    """Return the mapping that a text holds as YAML or JSON; an empty text is {}.
+    """Return the mapping in a text of YAML or JSON; an empty text is {}.
 
     Raises GoalRefused.
     """

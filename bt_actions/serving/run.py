@@ -1,6 +1,6 @@
 """One run of a served tree: on a thread of its own, from its behaviours to its outcome.
 
-The node and its executor are somebody else's. Nothing here knows who asked for the run.
+The server owns the node and its executor. Nothing here knows the client.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Run:
     Args:
         tree: the version that was checked; a newer one does not matter any more.
         inputs: values that were checked with it.
-        node: where goals are sent from; somebody spins it.
+        node: the node that goals are sent from; another thread spins it.
         watch: called with the runner before it runs.
         asked_by: the id of the RunTree goal, and of the run whose leaf sent it.
         begins: called with the full names of the servers that it uses, before it sends a goal.
@@ -56,21 +56,21 @@ class Run:
         self._runner: TreeRunner | None = None
         self._stream: Stream | None = None
         self.paused = False
-        """No new goal is begun."""
+        """Whether no new goal is begun."""
         self.ending: Ending | None = None
         self._state = State()
         self._events: Reader | None = None
         self._thread = threading.Thread(target=self._run, name=f"bt_actions-serve-{tree.name}")
-        self._thread.daemon = True  # as that of TreeRunner.start: what it leaves is drained at exit
+        self._thread.daemon = True  # as that of TreeRunner.start: its goals are drained at exit
 
     def start(self) -> None:
-        """Run. Returns at once."""
+        """Start the run, and return at once."""
         self._thread.start()
 
     def end(self, ending: Ending, *, abandon: bool = False) -> None:
-        """End the run before its time: its goals are canceled and drained. Returns at once.
+        """End the run before its time: cancel and drain its goals. Returns at once.
 
-        With `abandon`, goals that are being drained are waited for no longer.
+        `abandon` ends the wait for goals that are being drained.
         """
         with self._lock:
             self.ending = self.ending or ending
@@ -82,7 +82,7 @@ class Run:
             self._runner.interrupt(abandon=abandon)
 
     def pause(self, wanted: bool) -> None:
-        """Begin no new goal, or begin goals again; goals that run go on."""
+        """Begin no new goal, or begin goals again; running goals go on."""
         with self._lock:
             self.paused = wanted
             if self._runner is not None:
@@ -96,7 +96,7 @@ class Run:
 
     @contextlib.contextmanager
     def told(self) -> Iterator[State]:
-        """Give how it stands by now, also while a tick does not return; on any thread."""
+        """Give the present state of the run, also while a tick does not return; on any thread."""
         with self._lock:
             for event in self._events.take() if self._events is not None else ():
                 self._state.fold(event)
@@ -107,7 +107,7 @@ class Run:
     def _run(self) -> None:
         try:
             outcome = self._to_end()
-        except BaseException as error:  # noqa: BLE001 - whoever asked for it must be answered
+        except BaseException as error:  # noqa: BLE001 - the client must get an answer
             outcome = outcome_of(State(), succeeded=False, error=error)
         if self._stream is not None:
             self._stream.add(RunEnded, outcome.code, "", outcome.why, outcome.unaccounted)

@@ -1,7 +1,7 @@
 """`TreeServer`: trees as an action of a node, for other nodes to run by their names.
 
-The node and its executor are the user's. Which trees there are is catalog.py's, whose turn it is
-turns.py's, and a run its own (run.py); here is what they have to do with ROS.
+The node and its executor are the user's. catalog.py has the trees, turns.py the turns of goals, and
+run.py one run; this file connects them with ROS.
 """
 
 from __future__ import annotations
@@ -43,15 +43,16 @@ from bt_actions.serving.underway import Underway
 from bt_actions.utilities.plain_text import clean, in_words
 
 RESULT_TIMEOUT = 60
-"""Seconds for which an ended goal's result can be asked for; each one kept makes a goal slower."""
+"""Seconds for which an ended goal's result can be asked for; each kept result makes a goal
+slower."""
 _LAST_WORDS = 2.0
 """Seconds for the last results to be sent when the server is closed."""
 _LINGER = 0.25
-"""Seconds for who has just heard that its goal was accepted to ask for the result."""
+"""Seconds for a client whose goal was just accepted to ask for the result."""
 
 
 class _Admitted(NamedTuple):
-    """The tree and inputs of a goal that was admitted, before its client knows."""
+    """The tree and inputs of an admitted goal, before its client knows."""
 
     name: str
     file: str
@@ -60,13 +61,13 @@ class _Admitted(NamedTuple):
 
 
 class TreeServer:
-    """Serves `run_tree`, and beside it the services by which others list, check and control trees.
+    """A server of `run_tree`, with services by which others list, check and control trees.
 
     Args:
-        node: where all of it is, and from where the trees' goals are sent. Somebody spins it, on
-            another thread than the one that makes or closes this; any executor will do.
-        trees: folders of trees, or ``package://NAME/trees``; a tree's name is its file's. Of
-            other files, those are read that are linked there.
+        node: the place of all of it, from which the trees' goals are sent. Another thread than the
+            one that makes or closes the server spins it; any executor will do.
+        trees: folders of trees, or ``package://NAME/trees``; a tree's name is its file's. Other
+            files are read only where they are linked there.
         policy: what to do with a goal while another runs: "reject", "queue", "replace", "parallel".
         most: how many goals may wait (queue), or run (parallel).
         python: the packages whose classes the trees' ``python:`` nodes may name.
@@ -77,11 +78,12 @@ class TreeServer:
             and the like, too; secrets never.
 
     Names, relative to the node: the action ``run_tree``; the services ``~/list_trees``,
-    ``~/check_tree`` and ``~/control_tree``; the topics ``~/events`` and ``~/tree`` of the runs,
-    and ``~/rejections``, which keeps the last ten.
+    ``~/check_tree`` and ``~/control_tree``; the topics ``~/events`` and ``~/tree`` of the runs, and
+    ``~/rejections``, which keeps the last ten.
 
-    Close it while the node is spun, and before its context is shut down (as rclpy's own handler of
-    Ctrl-C does it): otherwise the trees' goals are drained all the same, and no client is answered.
+    Close the server while its node is spun, and before its context is shut down (as rclpy's own
+    handler of Ctrl-C does): otherwise the trees' goals are drained all the same, and no client is
+    answered.
 
     Raises NotADirectoryError for a folder that is none, TreeNotFoundError for a package without it,
     ValueError for a policy that is none.
@@ -162,7 +164,7 @@ class TreeServer:
             self._activate()
 
     def close(self) -> None:
-        """Accept nothing more, end all runs, answer their goals, and be gone.
+        """Accept no more goals, end all runs, answer their goals, and destroy the server.
 
         Returns when every goal has ended, or its `timeout.cancel` has passed; not on a thread of
         the node's executor.
@@ -171,7 +173,7 @@ class TreeServer:
             self.lifecycle.stop()
         self.halt(Ending.SERVER_ENDS)
         with contextlib.suppress(RuntimeError):  # of an interpreter that ends
-            wait([self._worker.submit(int)], _LAST_WORDS)  # until what is awaited from it is there
+            wait([self._worker.submit(int)], _LAST_WORDS)  # until its last work is done
         time.sleep(_LINGER)
         self._rosout.close()
         self._topics.close()
@@ -184,10 +186,10 @@ class TreeServer:
             self._recorder.close()
 
     def halt(self, ending: Ending = Ending.HALTED, why: str = "it ends") -> None:
-        """Accept nothing more, and end all runs; returns when they have ended."""
+        """Accept no more goals, and end all runs; returns when they have ended."""
         with self._answered:
             self._refuses = why
-            # What was admitted before comes now, if anybody spins the node, and ends as it comes.
+            # Admitted goals come now, if a thread spins the node, and end as they come.
             self._answered.wait_for(lambda: not self._turns.expected, _LAST_WORDS)
             goals = list(self._goals.values())
         for goal in goals:  # first of all, so that none begins as another ends
@@ -203,7 +205,10 @@ class TreeServer:
             self._answered.wait_for(lambda: not self._goals, _LAST_WORDS)
 
     def abandon(self) -> None:
-        """Have `halt` and `close` wait for no goal any more; `unaccounted` tells which are left."""
+        """Have `halt` and `close` wait for no goal any more.
+
+        `unaccounted` names those that are left.
+        """
         self._abandoned.set()
         for goal in list(self._goals.values()):
             goal.run.end(Ending.DEACTIVATED, abandon=True)
@@ -212,7 +217,7 @@ class TreeServer:
 
     def _configure(self) -> None:
         self.catalog = Catalog(self._folders, python=self._python)
-        for entry in self.catalog.entries():  # each file is read once, and what is wrong is known
+        for entry in self.catalog.entries():  # each file is read once, and its mistakes are known
             for warning in warnings_of(entry):
                 self._say("warn", warning.message)
         self._refuses = "it is inactive"
@@ -250,7 +255,7 @@ class TreeServer:
         try:
             self._refuse_more()
             entry, tree, values = await self._off(self.catalog.check, goal.tree, goal.inputs)
-            with self._lock:  # the other goals that came meanwhile are admitted by now
+            with self._lock:  # other goals may have been admitted meanwhile
                 self._refuse_more()
                 self._turns.expected += 1
         except GoalRefused as refused:
@@ -291,7 +296,7 @@ class TreeServer:
             self._end(each, Ending.REPLACED)
         if canceled:
             self._end(goal, Ending.CANCELED)
-        if refuses:  # it was admitted before
+        if refuses:  # the goal was admitted before
             self._end(goal, Ending.DEACTIVATED)
         self._begin(begun)
 
@@ -365,15 +370,15 @@ class TreeServer:
             self._worker.submit(self._ended, goal, outcome)  # not here: this may be a callback
 
     def _ended(self, goal: ServedGoal, outcome: RunOutcome) -> None:
-        """Have the goal of a run that is over answered, and the next run begin."""
+        """Answer the goal of a run that is over, and begin the next run."""
         seconds = None if goal.begun_at is None else time.monotonic() - goal.begun_at
         self._tell_of(goal, ends(outcome, seconds), "info" if outcome.as_wanted else "error")
-        for each in outcome.unaccounted:  # the log has it from whoever gave it up
+        for each in outcome.unaccounted:  # the log has it from the traffic
             self._rosout.say("error", f"{goal.label} may still be running: {each}")
         self._last[goal.tree] = outcome
         if outcome.settled:
             self._underway.ends(goal.id)
-        with self._lock:  # its client may send the next goal as soon as it is answered
+        with self._lock:  # the client may send its next goal as soon as this is answered
             begun = self._turns.leave(goal)
         try:
             self._answer(goal, outcome)
@@ -397,7 +402,7 @@ class TreeServer:
         self._action.answer(goal.client, result(outcome), status)
 
     def _tell(self) -> None:
-        """Tell the clients how far their runs are; the timer's callback."""
+        """Send feedback on their runs to the clients; the timer's callback."""
         with self._lock:
             goals = [*self._turns.running, *self._turns.waiting]
             if not any(goal.begun for goal in goals):

@@ -19,16 +19,16 @@ _STOPPED = tuple(each.value[0] for each in Ending)
 
 
 def begins(file: str, tree: Tree, inputs: Mapping[str, object], goal_name: str) -> str:
-    """Say what begins: its file, its inputs and the caller's name for it."""
+    """Say what begins: the file, the inputs and the caller's name."""
     given = {each.name: each.default for each in tree.inputs.values()} | dict(inputs)
     given |= {each.name: HIDDEN for each in tree.inputs.values() if each.secret}
     return begins_text(file, given) + clean(f", called {goal_name!r}" if goal_name else "")
 
 
 def ends(outcome: RunOutcome, seconds: float | None) -> str:
-    """Say how a run has ended; `seconds` is None for one that never began.
+    """Say how a run has ended; `seconds` is None for a run that never began.
 
-    Which goals are not accounted for has been said of each.
+    Goals that are not accounted for have their own lines.
     """
     status = Status.FAILURE
     if outcome.code in (Code.NONE, Code.UNKNOWN):
@@ -42,7 +42,7 @@ def ends(outcome: RunOutcome, seconds: float | None) -> str:
 
 
 def warnings_of(entry: ServedTree) -> list[Mistake]:
-    """Return what is wrong with the name of a tree: other files have the same name."""
+    """Return the conflicts of a tree's name: other files have the same name."""
     return [
         Mistake(
             SAME_NAME, f"{entry.file} is served as {entry.name!r}, and {each} is not", str(each)

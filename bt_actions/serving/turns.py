@@ -1,4 +1,4 @@
-"""The goals that run, wait, and are refused. Pure; no ROS, no thread.
+"""The turns of goals: running, waiting, and refused ones. Pure; no ROS, no thread.
 
 The caller holds a lock around each call.
 """
@@ -19,7 +19,7 @@ class Policy(enum.StrEnum):
     QUEUE = "queue"
     """The newer goal waits; at most `most` do."""
     REPLACE = "replace"
-    """The older one is halted, and the newer begins when all goals of the older have ended."""
+    """The older goal is halted, and the newer begins when all goals of the older have ended."""
     PARALLEL = "parallel"
     """The goals run beside each other, at most `most`."""
 
@@ -50,7 +50,7 @@ class Turns(Generic[T]):
     def come(self, goal: T) -> tuple[list[T], list[T]]:
         """Take a goal that was admitted. Return the goals to begin, and the goals to halt.
 
-        A goal that is halted still has to `leave`, also one that only waited.
+        A halted goal still has to `leave`, also one that only waited.
         """
         self.expected = max(0, self.expected - 1)
         self.waiting.append(goal)

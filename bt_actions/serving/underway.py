@@ -1,7 +1,8 @@
 """The actions that a server's trees use at this moment, on record should it be killed. No ROS.
 
-A server that is started again cleans up there, before it accepts goals. Beside the ledger, in
-memory; a server that ends in good order leaves no file, but for goals whose end it does not know.
+A server that is started again cleans up these actions before it accepts goals. The record lies in
+memory, beside the ledger. A server that ends in good order leaves no file, but for goals whose end
+it does not know.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class Underway:
                 self._write()
 
     def ends(self, run: object) -> None:
-        """Take off the record a run whose goals have all ended."""
+        """Take a run whose goals have all ended off the record."""
         with self._lock:
             if self._runs.pop(run, None) is not None:
                 self._write()
@@ -57,7 +58,7 @@ class Underway:
             else:
                 self._path.unlink(missing_ok=True)
         except OSError as error:
-            log.warning(f"what runs cannot be put on record, should this be killed: {error}")
+            log.warning(f"no record for cleanup, should this server be killed: {error}")
 
 
 def left_underway(domain: int) -> Iterable[tuple[Path, list[str]]]:
