@@ -1,7 +1,7 @@
 """Simulated robots, their action servers, and faults on purpose.
 
-Nothing here imports rclpy but `ros/`, which is imported where a server is made on an rclpy node.
-The servers' messages are imported when a server's name is first asked for.
+Only `ros/` imports rclpy, where a server is made on an rclpy node. The servers' messages are
+imported when a server's name is first asked for.
 """
 
 from __future__ import annotations

@@ -13,13 +13,13 @@ PER_METRE = 0.001
 PER_SECOND_AT_HOME = 0.01
 """Charge that comes back in one simulated second at home, of 1."""
 PERIOD = 1.0
-"""The charge is published that often, wall seconds;"""
+"""Wall seconds between two messages of the charge;"""
 PERIOD_AT_FIRST, AT_FIRST = 0.05, 3.0
-"""and so often in the first seconds, in which whoever listens is not discovered yet."""
+"""and in the first seconds, in which a listener may not be discovered yet."""
 
 
 class Battery:
-    """Empties on the way of a robot and fills at home."""
+    """A battery that empties on the way of a robot and fills at home."""
 
     def __init__(self, stepper: Stepper, world: World, prefix: str = "") -> None:
         """Publish on `battery_state` behind `prefix`, from now on."""

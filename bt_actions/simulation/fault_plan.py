@@ -1,4 +1,4 @@
-"""Which faults strike which goal of which server. Decided by a seed, never by the clock. No ROS."""
+"""The plan of faults: which goal of which server each one strikes. Decided by a seed. No ROS."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class GoalFaults(dict[FaultKind, Value]):
         return value if isinstance(value, float) else None
 
     def dies(self, phase: str) -> bool:
-        """Say whether the server dies in `phase`, one of PHASES."""
+        """Return whether the server dies in `phase`, one of PHASES."""
         return self.get(FaultKind.DIE) == phase
 
 
 @dataclass(slots=True)
 class FaultPlan:
-    """Decides which faults strike which goal.
+    """The choice of the faults that strike each goal.
 
     The dice of a goal depend on the seed, the server and the goal's number alone, so a run with the
     same seed meets the same faults however its servers take turns.
@@ -47,7 +47,7 @@ class FaultPlan:
 
     @property
     def uses_chance(self) -> bool:
-        """A seed is worth printing: not every fault is certain."""
+        """Whether a seed is worth printing: not every fault is certain."""
         return any(fault.probability < 1.0 for fault in self.faults)
 
     def check(self, servers: Iterable[str]) -> None:

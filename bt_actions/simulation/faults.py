@@ -1,11 +1,11 @@
-"""What a simulated server may do wrong on purpose, and to which of its goals. No ROS.
+"""The faults of a simulated server on purpose, and the goals that they strike. No ROS.
 
 A fault is written ``SERVER:WHEN:FAULT[=VALUE]``: ``move_robot:2:abort`` aborts the second goal that
 move_robot is asked for, ``gripper_control:5%:stall`` stalls one goal in twenty,
 ``/r1/move_robot:*:slow=3`` slows every goal of one robot. FaultKind is the one list of faults:
 parsing, help and documentation read it.
 
-Times in faults are wall seconds, as the deadlines they are meant to break are; only the motion
+Times in faults are wall seconds, as the deadlines that they are to break are; only the motion
 follows the simulation's speed.
 """
 
@@ -20,16 +20,16 @@ from typing import Self
 from bt_actions.utilities.suggest import did_you_mean
 
 Value = float | str | None
-"""What follows the ``=``: a number, a word, or None where the fault's own default means "half-way"
-or "always"."""
+"""The text after the ``=``: a number, a word, or None where the fault's own default means
+"half-way" or "always"."""
 
 
 class FaultError(ValueError):
-    """A fault that is written wrong, or that fits none of the servers; the text says what to do."""
+    """A fault that is written wrong, or fits none of the servers; the text has the remedy."""
 
 
 class Unit(StrEnum):
-    """What a fault's value is."""
+    """The unit of a fault's value."""
 
     NONE = ""
     SECONDS = "SECONDS"
@@ -40,7 +40,8 @@ class Unit(StrEnum):
 
 
 PHASES = ("accept", "execute", "cancel")
-"""When a server dies: before it answers the goal request, half-way, or when asked to cancel."""
+"""The phases in which a server dies: before it answers the goal request, half-way, or when asked
+to cancel."""
 
 
 class FaultKind(StrEnum):
@@ -49,7 +50,7 @@ class FaultKind(StrEnum):
     def __new__(
         cls, name: str, does: str = "", unit: Unit = Unit.NONE, default: Value = None
     ) -> Self:
-        """Make a member that says what the fault does, and what its value is when none is given."""
+        """Make a member with the words for its effect, and its default value."""
         kind = str.__new__(cls, name)
         kind._value_ = name
         kind.does, kind.unit, kind.default = does, unit, default
@@ -103,7 +104,7 @@ _PERCENT = re.compile(r"([0-9]+\.?[0-9]*|\.[0-9]+)%", re.ASCII)
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One fault: of which server, on which of its goals, and what it does."""
+    """One fault: its server, its goals, and its effect."""
 
     server: str
     """A name without namespace fits that server in every namespace; ``*`` fits every server."""
@@ -111,7 +112,7 @@ class Fault:
     value: Value = None
     """None stands for the fault's default."""
     number: int | None = None
-    """The goal it strikes, counted from 1 for each server; None for any."""
+    """The number of the goal that it strikes, from 1 for each server; None for any."""
     probability: float = 1.0
 
     def __post_init__(self) -> None:
@@ -124,7 +125,7 @@ class Fault:
 
     @classmethod
     def parse(cls, text: str) -> Fault:
-        """Read ``SERVER:WHEN:FAULT[=VALUE]``; raise FaultError, which says what is wrong with it.
+        """Read ``SERVER:WHEN:FAULT[=VALUE]``; raise FaultError, with the reason.
 
         WHEN is the number of a goal, ``*`` for every goal, or a percentage like ``5%``.
         """
@@ -163,7 +164,7 @@ class Fault:
         return f"{self.server}:{when}:{self.kind}{shown}"
 
     def fits(self, server: str) -> bool:
-        """Say whether this fault belongs to `server`, a fully qualified action name."""
+        """Return whether this fault belongs to `server`, a fully qualified action name."""
         if self.server == "*":
             return True
         if "/" in self.server:
@@ -172,7 +173,7 @@ class Fault:
 
 
 def table() -> str:
-    """Return all faults, one a line, with what they do and their defaults."""
+    """Return all faults, one a line, with their effects and defaults."""
     rows = []
     for kind in FaultKind:
         shown = f" ({kind.default:g})" if isinstance(kind.default, float) else ""

@@ -1,4 +1,4 @@
-"""What a goal means to the server that serves it. Subclasses fill it in; nothing here moves."""
+"""The meaning of a goal to its server. Subclasses define it; nothing here moves."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from typing import Any, Protocol
 
 
 class Motion(Protocol):
-    """What a goal makes its server do."""
+    """The work that a goal makes its server do."""
 
     @property
     def progress(self) -> float:
-        """How much of the way is behind it, 0 to 1."""
+        """The share of the way that is done, 0 to 1."""
 
     @property
     def done(self) -> bool:
-        """It has arrived: nothing moves any more."""
+        """Whether the motion has arrived: nothing moves any more."""
 
     def step(self, share: float) -> None:
-        """Move for one step of simulated time; with `share` under 1, by so much less."""
+        """Move for one step of simulated time, or for `share` of one."""
 
 
 class Finish(Enum):
-    """Why a goal ended."""
+    """The reason why a goal ended."""
 
     COMPLETED = "completed"
     CANCELED = "canceled"
     TIMEOUT = "timeout"
-    """The server's own limit on how long a goal may take."""
+    """The server's own time limit for a goal."""
     REPLACED = "replaced"
     """A newer goal took its place."""
     FAULT = "fault"
@@ -40,14 +40,14 @@ class Finish(Enum):
 class GoalMeaning(ABC):
     """The part of a simulated server that knows its action type.
 
-    What these methods raise refuses or aborts the goal; it never reaches the executor.
+    An error in these methods refuses or aborts the goal, and never reaches the executor.
     """
 
     action_type: Any
 
     @abstractmethod
     def refusal(self, goal: Any) -> str | None:
-        """Return why `goal` is refused, or None."""
+        """Return the reason to refuse `goal`, or None."""
 
     @abstractmethod
     def begin(self, goal: Any) -> Motion:
@@ -66,15 +66,15 @@ class GoalMeaning(ABC):
         return (self.feedback(motion),)
 
     def verdict(self, motion: Motion) -> tuple[Finish, str]:
-        """Return how a goal that is done ends, and why where that is not COMPLETED."""
+        """Return the end of a goal that is done, and the reason where that is not COMPLETED."""
         return Finish.COMPLETED, ""
 
     def halt(self, motion: Motion) -> None:  # noqa: B027 - nothing moves everywhere
         """Stand still: the goal has ended before it was done, or the server has died."""
 
     def drop_part(self) -> None:  # noqa: B027 - not every server has a part
-        """Let the part fall, where there is one: the fault drop_part strikes."""
+        """Let a held part fall: the fault drop_part strikes."""
 
     def state(self, motion: Motion) -> Mapping[str, float]:
-        """Return what the journal says of a step."""
+        """Return the values of a step for the journal."""
         return {"progress": round(motion.progress, 4)}

@@ -1,4 +1,7 @@
-"""A gripper whose fingers open and close step by step. No ROS, no clock, no idea what it holds."""
+"""A gripper whose fingers open and close step by step.
+
+No ROS, no clock, no knowledge of the part.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,11 @@ import math
 CLOSED = 0.0
 OPEN = 100.0
 STEP = 10.0
-"""How far the fingers go in one step, percent of the whole stroke."""
+"""The way of the fingers in one step, in percent of the whole stroke."""
 
 
 def refusal(position: float, max_effort: float = 0.0) -> str | None:
-    """Return why the gripper cannot go to `position` (percent) with that effort (N), or None."""
+    """Return the reason against `position` (percent) with that effort (N), or None."""
     if not math.isfinite(position):
         return f"the position must be a finite number, not {position}"
     if not CLOSED <= position <= OPEN:
@@ -22,7 +25,7 @@ def refusal(position: float, max_effort: float = 0.0) -> str | None:
 
 
 class GripperSimulator:
-    """How far the fingers are open (percent), where they are going, and whether they are stuck."""
+    """The fingers: their opening (percent), their target, and whether they are stuck."""
 
     def __init__(self, position: float = CLOSED) -> None:
         self.position = position
@@ -35,12 +38,12 @@ class GripperSimulator:
 
     @property
     def reached(self) -> bool:
-        """The fingers are where they were sent."""
+        """Whether the fingers are at their target."""
         return self.position == self.target
 
     @property
     def done(self) -> bool:
-        """The fingers will not move any more, either way."""
+        """Whether the fingers move no more, at the target or stuck."""
         return self.reached or self.stalled
 
     def set_goal(self, position: float) -> None:
@@ -56,7 +59,7 @@ class GripperSimulator:
     def move_step(self, share: float = 1.0, between: float | None = None) -> float:
         """Go one step, or `share` (0 to 1) of one, and return the position.
 
-        `between` is how wide the thing between the fingers is: closing, they stall on it.
+        `between` is the width of the thing between the fingers: closing, they stall on it.
         """
         way = self.target - self.position
         reach = STEP * share
@@ -66,5 +69,5 @@ class GripperSimulator:
         return self.position
 
     def stop(self) -> None:
-        """Stand still where the fingers are."""
+        """Stop the fingers where they are."""
         self.target = self.position

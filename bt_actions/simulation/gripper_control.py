@@ -30,7 +30,7 @@ class _Grip:
 
     @property
     def reached(self) -> bool:
-        """The fingers are where this goal sent them."""
+        """Whether the fingers are at this goal's target."""
         return self.gripper.position == self._position
 
     @property
@@ -42,7 +42,7 @@ class _Grip:
 
 
 class GripperServer(SimulatedServer):
-    """Serves Gripper. Fingers that stall on the part have succeeded: `stalled` tells.
+    """The server of Gripper. Fingers that stall on the part have succeeded, with `stalled` true.
 
     A newer goal aborts the older: there is one pair of fingers.
     """
@@ -50,7 +50,7 @@ class GripperServer(SimulatedServer):
     def __init__(
         self, node: Any, world: World, name: str = "gripper_control", **settings: Any
     ) -> None:
-        """`settings` are those of SimulatedServer."""
+        """Serve the gripper of `world`; `settings` are those of SimulatedServer."""
         self.world = world
         super().__init__(node, Gripper, name, **{"time_limit": TIME_LIMIT} | settings)
 

@@ -1,7 +1,7 @@
 """Goal requests on their way to a decision: counted, struck by faults, written down. No ROS.
 
-A request is known by its message until rclpy asks for the decision, because rclpy then tells
-nothing else, and by its goal's id from the decision to the start.
+A request is known by its message until rclpy asks for the decision, because rclpy tells no more
+then, and by its goal's id from the decision to the start.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from bt_actions.utilities.plain_text import raised
 
 @dataclass(frozen=True, slots=True)
 class GoalRequest:
-    """A goal that was asked for."""
+    """A request for a goal."""
 
     goal_id: str
     number: int
@@ -26,12 +26,12 @@ class GoalRequest:
 
     @property
     def is_lost(self) -> bool:
-        """No goal will come of it: the server dies of it, or never decides."""
+        """Whether no goal follows: the request kills the server, or is never decided."""
         return self.faults.dies("accept") or FaultKind.DROP_GOAL in self.faults
 
 
 class Intake:
-    """Counts the goals of one server and decides on them."""
+    """The intake of one server, which counts its goals and decides on them."""
 
     def __init__(
         self,
@@ -41,7 +41,10 @@ class Intake:
         record: Callable[..., None],
         warn: Callable[[str], None],
     ) -> None:
-        """`strike` tells the faults of a goal; `record` writes into the journal, `warn` the log."""
+        """Make an intake; `strike` returns the faults of a goal, `record` and `warn` write lines.
+
+        `record` writes into the journal, `warn` into the log.
+        """
         self.count = 0
         self._server = server
         self._strike = strike
@@ -71,7 +74,7 @@ class Intake:
         else:
             try:
                 reason = refusal(goal)
-            except Exception as error:  # noqa: BLE001 - it would end the executor's spin
+            except Exception as error:  # noqa: BLE001 - an error would end the executor's spin
                 reason = f"it could not be checked: {raised(error)}"
         if reason:
             self._reject(request, reason)

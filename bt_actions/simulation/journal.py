@@ -1,8 +1,8 @@
-"""What happened to every goal, from the server's side: one JSON object a line, as it happens.
+"""The journal: the life of every goal as its server sees it, one JSON object a line.
 
-Each line is one write to a file opened for appending, so that a process killed in mid-flight leaves
-whole lines, and a restarted one goes on in the same file. Times are of the monotonic clock, which
-all processes of a machine share. No ROS. A journal that cannot be written never stops a server.
+Each line is one write to a file opened for appending, so that a killed process leaves whole lines,
+and a restarted one goes on in the same file. Times are of the monotonic clock, which all processes
+of a machine share. No ROS. A journal that cannot be written never stops a server.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from typing import Any
 
 
 class Event(StrEnum):
-    """What a line tells."""
+    """The event of a line."""
 
     OPENED = "opened"
-    """The server is there. It has no goal, as CLOSED."""
+    """The server is there. The line has no goal, as CLOSED."""
     RECEIVED = "received"
     REJECTED = "rejected"
     ACCEPTED = "accepted"
@@ -40,7 +40,7 @@ class Event(StrEnum):
 
 
 ENDS = frozenset({Event.CANCELED, Event.SUCCEEDED, Event.ABORTED, Event.DIED})
-"""After one of these a goal is no longer live."""
+"""The events after which a goal is no longer live."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,15 +52,15 @@ class JournalLine:
     server: str
     """The fully qualified action name."""
     goal: str
-    """The goal's id in hex; empty where the line is about the server."""
+    """The goal's id in hex; empty for a line about the server."""
     event: Event
     pid: int
     more: Mapping[str, Any] = field(default_factory=dict)
-    """What else the line holds: number, pose, position, reason, faults, replaced …"""
+    """The rest of the line: number, pose, position, reason, faults, replaced …"""
 
     @property
     def pose(self) -> float | None:
-        """Where the robot was, m; the opening in percent for a gripper."""
+        """The position of the robot, m; the opening in percent for a gripper."""
         for key in ("pose", "position"):
             if key in self.more:
                 return float(self.more[key])
@@ -68,12 +68,12 @@ class JournalLine:
 
     @property
     def reason(self) -> str:
-        """Why, where there is a why."""
+        """The reason, or ""."""
         return str(self.more.get("reason", ""))
 
 
 class Journal:
-    """Writes the lines. Without a path it writes nothing and costs nothing."""
+    """The writer of the lines, which without a path writes nothing and costs nothing."""
 
     def __init__(
         self,
@@ -84,7 +84,7 @@ class Journal:
     ) -> None:
         """Append to `path`, which is created; raises OSError when it cannot be opened.
 
-        When a line cannot be written later (a full disk), `on_error` is told, once.
+        `on_error` is told, once, that a line cannot be written later (a full disk).
         """
         self._path = None if path is None else Path(path)
         self._clock = clock
@@ -99,11 +99,11 @@ class Journal:
         return f"<Journal {self._path or 'off'}>"
 
     def __bool__(self) -> bool:
-        """Say whether it writes anything, so that callers need not gather what is not kept."""
+        """Return whether lines are written, so that callers need not gather data for nothing."""
         return self._file is not None
 
     def write(self, server: str, goal: str, event: Event, **more: object) -> None:
-        """Add a line; values in `more` that JSON does not know are written as text."""
+        """Add a line; values in `more` that JSON lacks are written as text."""
         if self._file is None:
             return
         line = {"t": self._clock(), "server": server, "goal": goal, "event": event.value}
@@ -158,7 +158,7 @@ class Interval:
     pid: int
     start: float
     end: float | None
-    """None: still live where the journal stops."""
+    """The moment of the end; None: still live where the journal stops."""
     how: Event | None
     """The event that ended it."""
 
@@ -169,10 +169,10 @@ def live_intervals(
     *,
     killed: Mapping[int, float] | None = None,
 ) -> list[Interval]:
-    """Return when each goal was live, as its server saw it, in the order of acceptance.
+    """Return the time in which each goal was live, as its server saw it, in order of acceptance.
 
-    `killed` tells when processes (by id) were killed from outside, which no journal can hold: their
-    goals ended then.
+    `killed` has the moments at which processes (by id) were killed from outside, which no journal
+    can hold: their goals ended then.
     """
     killed = killed or {}
     open_: dict[tuple[int, str, str], float] = {}
@@ -198,7 +198,7 @@ def max_live(
     *,
     killed: Mapping[int, float] | None = None,
 ) -> int:
-    """Return how many goals were live at once, at most, on `server` (or on all together).
+    """Return the greatest number of goals live at once on `server` (or on all together).
 
     The order of the lines counts: in virtual time, many are of one moment.
     """
@@ -221,10 +221,9 @@ def max_live(
 def ends(
     entries: Iterable[JournalLine], server: str | None = None
 ) -> dict[tuple[str, str], Event | None]:
-    """Return how each goal that was received ended.
+    """Return the end of each goal that was received, by server and goal id, in order of arrival.
 
-    By server and goal id, in the order of their coming. None: it is still live, or was never
-    answered.
+    None: the goal is still live, or was never answered.
     """
     found: dict[tuple[str, str], Event | None] = {}
     for entry in entries:
@@ -232,7 +231,7 @@ def ends(
             continue
         key = (entry.server, entry.goal)
         if entry.event is Event.CANCEL_REQUESTED and key not in found:
-            continue  # of a goal that is not known here
+            continue  # the goal is not known here
         found.setdefault(key, None)
         if entry.event in ENDS or entry.event is Event.REJECTED:
             found[key] = entry.event
@@ -240,5 +239,5 @@ def ends(
 
 
 def executions(entries: Iterable[JournalLine]) -> dict[tuple[str, str], int]:
-    """Return how often each goal, by server and id, was accepted: twice is executed twice."""
+    """Return the number of acceptances of each goal, by server and id: two are two executions."""
     return Counter((entry.server, entry.goal) for entry in entries if entry.event is Event.ACCEPTED)

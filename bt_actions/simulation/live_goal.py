@@ -1,4 +1,4 @@
-"""One accepted goal on its server: what each step does, when and how it ends, what is written down.
+"""One accepted goal on its server: its steps, its end, and its lines in the journal.
 
 The faults act here, once for all servers. No ROS and no clock: times are passed in, in seconds of
 one steady clock. A goal never ends twice.
@@ -19,13 +19,13 @@ from bt_actions.simulation.platform import Wire
 from bt_actions.utilities.plain_text import raised
 
 FLOOD_AT_ONCE = 1000
-"""A flood never gives more feedback than this in one step."""
+"""Feedback messages of a flood in one step, at most."""
 _STATUSES = {Finish.COMPLETED: STATUS_SUCCEEDED, Finish.CANCELED: STATUS_CANCELED}
 _EVENTS = {STATUS_SUCCEEDED: Event.SUCCEEDED, STATUS_CANCELED: Event.CANCELED}
 
 
 class Owner(GoalMeaning):
-    """What a live goal asks of its server, beside what the goal means."""
+    """The server of a live goal, beside the meaning of the goal."""
 
     @abstractmethod
     def record(self, goal_id: str, event: Event, **more: object) -> None:
@@ -33,7 +33,7 @@ class Owner(GoalMeaning):
 
     @abstractmethod
     def broken(self, goal_id: str, reason: str) -> None:
-        """Write into the log why a goal is aborted for which its script, or subclass, raised."""
+        """Write into the log why a goal is aborted: its script, or subclass, raised."""
 
     @abstractmethod
     def ended(self, goal: LiveGoal, result: Any) -> None:
@@ -41,11 +41,11 @@ class Owner(GoalMeaning):
 
     @abstractmethod
     def die(self, reason: str) -> None:
-        """Be gone: a fault kills the server."""
+        """Go away for good: a fault kills the server."""
 
     @abstractmethod
     def restart(self, seconds: float) -> None:
-        """Be gone for so many wall seconds."""
+        """Go away for so many wall seconds."""
 
 
 class LiveGoal:
@@ -86,11 +86,11 @@ class LiveGoal:
 
     @property
     def due(self) -> float | None:
-        """When `poll` has to be called although nothing moves; None: never."""
+        """The moment at which `poll` is due although nothing moves; None: never."""
         return None if self._over else self._cancel_at
 
     def step(self, now: float) -> bool:
-        """Move for one step of simulated time; return whether it still moves."""
+        """Move for one step of simulated time; return whether the goal still moves."""
         problem = self._move() if self._moving else ""
         self._record(Event.STEP)
         if problem:
@@ -101,7 +101,7 @@ class LiveGoal:
         return self._moving
 
     def poll(self, now: float) -> None:
-        """End, where a cancel's time has come."""
+        """End the goal, where a cancel's time has come."""
         if self._cancel_at is None or now < self._cancel_at:
             return
         if FaultKind.SUCCEED_ON_CANCEL in self.faults:
@@ -112,7 +112,7 @@ class LiveGoal:
             self._end(Finish.CANCELED)
 
     def cancel(self, now: float) -> bool:
-        """Say whether a request to cancel is granted; it is carried out by `poll`."""
+        """Return whether a request to cancel is granted; `poll` carries it out."""
         granted = not self._over and FaultKind.REJECT_CANCEL not in self.faults
         if granted and self._cancel_at is None and FaultKind.IGNORE_CANCEL not in self.faults:
             self._cancel_at = now + (self.faults.number(FaultKind.DELAY_CANCEL) or 0.0)
@@ -142,7 +142,7 @@ class LiveGoal:
         return self.motion.done or self.motion.progress >= 0.5
 
     def _move(self) -> str:
-        """Move by one step; return why it cannot."""
+        """Move by one step; return the reason why that is impossible, or ""."""
         self._elapsed += self._step_period
         try:
             if not self.motion.done:
@@ -152,7 +152,7 @@ class LiveGoal:
         return ""
 
     def _strike(self, now: float) -> bool:
-        """Let the faults strike whose time has come; return whether that is all of this step."""
+        """Let the faults strike whose time has come; return whether this step is over with that."""
         if self._time_for(FaultKind.DIE, now) and self.faults.dies("execute"):
             self._owner.die("fault: die")
         elif FaultKind.RESTART in self.faults and self._half_way:
@@ -163,7 +163,7 @@ class LiveGoal:
             dropped = self._time_for(FaultKind.DROP_PART, now) and not self._part_dropped
             self._part_dropped |= dropped
             self._stalled = self._time_for(FaultKind.STALL, now)
-            if dropped:  # the goal itself goes on; one feedback less is not missed
+            if dropped:  # the goal itself goes on, with one feedback less
                 self._owner.drop_part()
             return dropped or self._stalled
         return True

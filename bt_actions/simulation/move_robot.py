@@ -14,7 +14,7 @@ from bt_actions.simulation.server import SimulatedServer
 from bt_actions.simulation.world import World
 
 TIME_LIMIT = 30.0
-"""The server gives up a goal that takes longer, s of simulated time."""
+"""Seconds of simulated time after which the server gives up a goal."""
 
 _STATUS = {
     Finish.COMPLETED: MoveRobot.Result.STATUS_COMPLETED,
@@ -45,13 +45,13 @@ class _Drive:
 
 
 class MoveRobotServer(SimulatedServer):
-    """Serves MoveRobot: drives the robot of `world`, and with it what the gripper holds.
+    """The server of MoveRobot, which drives the robot of `world`, with the part in its gripper.
 
     A newer goal aborts the older: there is one axis.
     """
 
     def __init__(self, node: Any, world: World, name: str = "move_robot", **settings: Any) -> None:
-        """`settings` are those of SimulatedServer."""
+        """Serve the robot of `world`; `settings` are those of SimulatedServer."""
         self.world = world
         super().__init__(node, MoveRobot, name, **{"time_limit": TIME_LIMIT} | settings)
 

@@ -1,4 +1,4 @@
-"""What simulated servers stand on: an rclpy node, or the virtual network of `bt_actions.testing`.
+"""The platform of simulated servers: an rclpy node, or the virtual network of `bt_actions.testing`.
 
 Protocols alone. Goal ids are in hex; messages are Any, because rosidl gives them no common base.
 """
@@ -10,51 +10,51 @@ from typing import Any, Literal, Protocol
 
 
 class Request(Protocol):
-    """What a client has sent to an action server."""
+    """A request of a client to an action server."""
 
     @property
     def kind(self) -> Literal["goal", "cancel", "result"]:
-        """Which of the three services was called."""
+        """The called service, of three."""
 
     @property
     def goal_id(self) -> str:
-        """The goal it is about; zeros in a request to cancel mean all goals."""
+        """The goal in question; zeros in a request to cancel mean all goals."""
 
     @property
     def goal(self) -> Any:
-        """The goal message, of a request for a goal."""
+        """The goal message of a goal request."""
 
 
 class RequestHandler(Protocol):
-    """What an action server decides; none of it raises."""
+    """The decisions of an action server; no method raises."""
 
     def on_request(self, request: Request) -> bool:
-        """Return whether to answer now; one that is kept may be given back to `Wire.answer_soon`.
+        """Return whether to answer now.
 
-        What is never answered is lost.
+        A kept request may be given to `Wire.answer_soon`, or is lost.
         """
 
     def on_answered(self, request: Request) -> None:
-        """The request has been answered."""
+        """Take note that the request has been answered."""
 
     def decide(self, goal: Any) -> bool:
         """Return whether to accept a goal."""
 
     def start(self, goal_id: str, goal: Any) -> None:
-        """A goal has been accepted, and its client told."""
+        """Start an accepted goal, whose client has been told."""
 
     def cancel(self, goal_id: str) -> bool:
         """Return whether to cancel an accepted goal."""
 
 
 class Wire(Protocol):
-    """The server side of an action. It knows the state of each goal, and carries messages."""
+    """The server side of an action: it knows the state of each goal, and carries messages."""
 
     def answer_soon(self, request: Request, *, silent: bool = False) -> None:
-        """Answer a request that was kept; `silent` accepts a goal without telling its client."""
+        """Answer a kept request; `silent` accepts a goal without telling its client."""
 
     def knows(self, goal_id: str) -> bool:
-        """Whether this goal was accepted and is not forgotten yet."""
+        """Return whether this goal was accepted and is not forgotten yet."""
 
     def start(self, goal_id: str) -> None:
         """Set an accepted goal to EXECUTING."""
@@ -63,27 +63,30 @@ class Wire(Protocol):
         """Publish feedback."""
 
     def end(self, goal_id: str, status: int) -> int:
-        """Set a goal to a terminal status; return that which it has now: it may have had one."""
+        """Set a goal to a terminal status.
+
+        Return its status, which may be an earlier terminal one.
+        """
 
     def finish(self, goal_id: str, result: Any) -> None:
-        """Send the result of a goal that has ended to all who ask for it."""
+        """Send the result of an ended goal to all clients that ask for it."""
 
     def destroy(self) -> None:
-        """Go, at once and without a word to the clients."""
+        """Go away, at once and without a word to the clients."""
 
 
 class Publisher(Protocol):
-    """Publishes on one topic."""
+    """A publisher on one topic."""
 
     def publish(self, message: Any) -> None:
-        """Publish a message; where it has a header, its stamp is set."""
+        """Publish a message, and set the stamp of its header, if it has one."""
 
     def destroy(self) -> None:
         """Publish no more."""
 
 
 class Timer(Protocol):
-    """Rings once, when its time has come."""
+    """A timer that rings once, when its time has come."""
 
     def set(self, when: float | None) -> None:
         """Ring at `when` in place of any earlier setting; None: not at all."""
@@ -93,24 +96,24 @@ class Timer(Protocol):
 
 
 class SimulationLog(Protocol):
-    """Where servers say what goes wrong."""
+    """The log of the servers."""
 
     def info(self, text: str) -> None:
-        """Say what is as it should be."""
+        """Log good news."""
 
     def warning(self, text: str) -> None:
-        """Say what a client did wrong."""
+        """Log a fault of a client."""
 
     def error(self, text: str) -> None:
-        """Say what went wrong here."""
+        """Log a fault of the simulation."""
 
 
 class Platform(Protocol):
-    """What simulated servers stand on."""
+    """The platform of simulated servers."""
 
     @property
     def log(self) -> SimulationLog:
-        """Its log."""
+        """The log of the platform."""
 
     def now(self) -> float:
         """Return the seconds of a steady clock."""
@@ -124,7 +127,7 @@ class Platform(Protocol):
     def serve(
         self, action_type: Any, name: str, server: RequestHandler, result_timeout: float
     ) -> Wire:
-        """Serve an action; a goal that has ended is forgotten after `result_timeout` seconds."""
+        """Serve an action; an ended goal is forgotten after `result_timeout` seconds."""
 
     def publisher(self, message_type: Any, topic: str) -> Publisher:
         """Make a publisher."""

@@ -1,4 +1,4 @@
-"""Keeps back answers to result requests, as the faults drop_result and delay_result say. No ROS."""
+"""The faults drop_result and delay_result, which keep back answers to result requests. No ROS."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ class _Kept:
 
 
 class ResultFaults:
-    """Knows the goals whose results are lost or late, from their acceptance until forgotten."""
+    """The goals whose results are lost or late, from their acceptance until they are forgotten."""
 
     def __init__(self, stepper: Stepper, answer: Callable[[Any], None]) -> None:
-        """`answer` is called with a request once its time has come."""
+        """Make the register; `answer` is called with a request once its time has come."""
         self._stepper = stepper
         self._answer = answer
         self._goals: dict[str, _Kept] = {}
 
     def expect(self, goal_id: str, faults: GoalFaults) -> None:
-        """A goal was accepted."""
+        """Take note that a goal was accepted."""
         if FaultKind.DROP_RESULT in faults or FaultKind.DELAY_RESULT in faults:
             self._goals[goal_id] = _Kept(faults)
 
     def on_request(self, goal_id: str, taken: Any) -> bool:
-        """Return whether to answer a result request now; if not, it is lost or comes later."""
+        """Return whether to answer a result request now; else the answer is lost or comes later."""
         kept = self._goals.get(goal_id)
         if kept is None:
             return True
@@ -56,7 +56,7 @@ class ResultFaults:
         return False
 
     def ended(self, goal_id: str, now: float, remembered: float) -> None:
-        """A goal has ended; its server remembers it for so many seconds."""
+        """Take note that a goal has ended, and is remembered for so many seconds."""
         kept = self._goals.get(goal_id)
         if kept is None:
             return
@@ -74,5 +74,5 @@ class ResultFaults:
         self._goals.pop(goal_id, None)
 
     def clear(self) -> None:
-        """The server has died."""
+        """Forget all goals: the server has died."""
         self._goals.clear()

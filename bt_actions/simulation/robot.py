@@ -1,7 +1,7 @@
-"""A robot on one axis, moving step by step. No ROS, no clock: whoever owns it calls `move_step`.
+"""A robot on one axis, moving step by step. No ROS, no clock: its owner calls `move_step`.
 
-It moves as in the article this project starts from: each step covers a tenth of what is left, and
-the robot has arrived when less than a centimetre is left.
+The robot moves as in the article this project starts from: each step covers a tenth of the rest of
+the way, and the robot has arrived when less than a centimetre is left.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ import math
 from enum import IntEnum
 
 STEP_FRACTION = 0.1
-"""Part of the way left that one step covers."""
+"""Part of the rest of the way that one step covers."""
 TOLERANCE = 0.01
-"""The robot has arrived when it is nearer to its target than this, m."""
+"""Distance from the target within which the robot has arrived, m."""
 LIMIT = 10.0
-"""The axis ends here on either side of zero, m."""
+"""The length of the axis on either side of zero, m."""
 
 
 class RobotStatus(IntEnum):
-    """The values are those of MoveRobot's feedback constants."""
+    """The status of the robot, with the values of MoveRobot's feedback constants."""
 
     READY = 0
     MOVING = 1
@@ -26,7 +26,7 @@ class RobotStatus(IntEnum):
 
 
 def refusal(distance: float) -> str | None:
-    """Return why the robot cannot go to `distance` (m), or None when it can."""
+    """Return the reason against `distance` (m), or None."""
     if not math.isfinite(distance):
         return f"the distance must be a finite number, not {distance}"
     if abs(distance) > LIMIT:
@@ -35,7 +35,7 @@ def refusal(distance: float) -> str | None:
 
 
 class RobotSimulator:
-    """Where the robot is, where it is going, and one step on the way."""
+    """The robot: its pose, its target, and its steps."""
 
     def __init__(self, pose: float = 0.0) -> None:
         self.current_pose = pose
@@ -56,19 +56,22 @@ class RobotSimulator:
         self._status = RobotStatus.MOVING
 
     def move_step(self, share: float = 1.0) -> float:
-        """Cover a tenth of what is left, or `share` (0 to 1) of that tenth; return the pose."""
+        """Cover a tenth of the rest of the way, or `share` (0 to 1) of that tenth.
+
+        Return the pose.
+        """
         if self._status is RobotStatus.MOVING:
             self.current_pose += STEP_FRACTION * share * (self.target_pose - self.current_pose)
         return self.current_pose
 
     def get_status(self) -> RobotStatus:
-        """Return what the robot is doing; it has COMPLETED within TOLERANCE of its target."""
+        """Return the status of the robot, which has COMPLETED within TOLERANCE of its target."""
         near = abs(self.current_pose - self.target_pose) < TOLERANCE
         if self._status is RobotStatus.MOVING and near:
             self._status = RobotStatus.COMPLETED
         return self._status
 
     def stop(self) -> None:
-        """Stand still where it is; what is left of the way is forgotten."""
+        """Stop the robot where it is, and forget the rest of the way."""
         self.target_pose = self.current_pose
         self._status = RobotStatus.READY

@@ -1,6 +1,7 @@
-"""An action server for any action type that does what a script says: for tests, and for users.
+"""An action server for any action type that follows a script: for tests, and for users.
 
-It has no world: a goal takes its time, gives feedback, and ends. The faults are those of the robot.
+The server has no world: a goal takes its time, gives feedback, and ends. The faults are those of
+the robot.
 """
 
 from __future__ import annotations
@@ -18,20 +19,20 @@ from bt_actions.simulation.server import SimulatedServer
 
 @dataclass(frozen=True, slots=True)
 class Script:
-    """What a ScriptedServer does with a goal, unless a fault strikes it."""
+    """The treatment of a goal by a ScriptedServer, unless a fault strikes it."""
 
     duration: float | Callable[[Any], float] = 0.5
-    """Seconds of simulated time a goal takes, or a function of the goal."""
+    """Seconds of simulated time that a goal takes, or a function of the goal."""
     feedback: Callable[[Any, float], Any] | None = None
     """From the goal and its progress (0 to 1) to the feedback message; None: an empty one."""
     result: Callable[[Any], Any] | None = None
     """From the goal to the result message of a goal that succeeds; None: an empty one."""
     refuse: Callable[[Any], str | None] | None = None
-    """From the goal to why it is refused, or None; None: nothing is."""
+    """From the goal to the reason to refuse it, or None; None refuses nothing."""
     aborts: Callable[[Any], str | None] | None = None
-    """From the goal to why it is aborted at its end, or None; None: nothing is."""
+    """From the goal to the reason to abort it at its end, or None; None aborts nothing."""
     preempts: bool = False
-    """A newer goal aborts the older ones. Otherwise goals run beside each other."""
+    """Whether a newer goal aborts the older ones; otherwise goals run beside each other."""
 
 
 class _Wait:
@@ -49,14 +50,14 @@ class _Wait:
 
     @property
     def done(self) -> bool:
-        return self._elapsed >= self._duration - 1e-9  # of adding up periods
+        return self._elapsed >= self._duration - 1e-9  # the error of adding up periods
 
     def step(self, share: float) -> None:
         self._elapsed += self._period * share
 
 
 class ScriptedServer(SimulatedServer):
-    """Serves any action type; see Script for what it does with a goal."""
+    """A server of any action type; Script has the treatment of a goal."""
 
     def __init__(
         self,
@@ -68,8 +69,8 @@ class ScriptedServer(SimulatedServer):
     ) -> None:
         """Serve `action_type` under `name` on `node`; `settings` are those of SimulatedServer.
 
-        What a script's functions raise refuses or aborts the goal, with the exception as the reason
-        in log and journal.
+        An error in a script's functions refuses or aborts the goal, and is the reason in log and
+        journal.
         """
         self.script = script or Script()
         defaults = {"step_period": 0.05, "preempts": self.script.preempts}

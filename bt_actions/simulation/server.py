@@ -1,8 +1,8 @@
-"""What all simulated action servers share: goals from request to end, their faults, their journal.
+"""The common part of all simulated action servers: goals from request to end, faults, journal.
 
-A subclass says what a goal means (GoalMeaning); what may go wrong is decided by `faults`, and how,
-by `intake`, `live_goal` and `result_faults`. The same code serves on an rclpy node and on the
-virtual network (`platform`): nothing here blocks, raises into an executor, or has a thread.
+A subclass defines the meaning of a goal (GoalMeaning); `faults` decide which goal is struck, and
+`intake`, `live_goal` and `result_faults` carry them out. The same code serves on an rclpy node and
+on the virtual network (`platform`): nothing here blocks, raises into an executor, or has a thread.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from bt_actions.simulation.stepper import Stepper
 from bt_actions.utilities.plain_text import raised
 
 RESULT_TIMEOUT = 5.0
-"""How long a finished goal is remembered, s. rclpy's own 15 minutes make each new goal slower."""
+"""Seconds for which a finished goal is remembered. rclpy's own 15 minutes make each new goal
+slower."""
 
 _ALL_GOALS = "0" * 32
 
@@ -50,11 +51,10 @@ class SimulatedServer(Owner):
     ) -> None:
         """Serve `action_type` under `name`, which is expanded with the node's namespace.
 
-        `node` is an rclpy node, or another Platform.
-        Servers that share a `stepper` share its timer and its lock, its speed and step period; a
-        server without one makes its own. `time_limit` is in seconds of simulated time. With
-        `preempts` a newer goal aborts the older ones. `on_death` is called when the fault `die`
-        strikes, before the server is destroyed; without it, that is all that happens.
+        `node` is an rclpy node, or another Platform. Servers that share a `stepper` share its timer
+        and its lock, its speed and step period; a server without one makes its own. `time_limit` is
+        in seconds of simulated time. With `preempts` a newer goal aborts the older ones. `on_death`
+        is called when the fault `die` strikes, before the server is destroyed.
 
         Raises FaultError when a fault fits no server of this name.
         """
@@ -95,7 +95,7 @@ class SimulatedServer(Owner):
 
     @property
     def is_open(self) -> bool:
-        """The server is there: not dead, not closed."""
+        """Whether the server is there: not dead, not closed."""
         return self._wire is not None
 
     @property
@@ -105,7 +105,10 @@ class SimulatedServer(Owner):
             return list(self._live)
 
     def open(self) -> None:
-        """Be there; again after `die`. Nothing happens when it is there already, or closed."""
+        """Bring the server up, again after `die`.
+
+        Do nothing when it is there already, or closed.
+        """
         with self.stepper.lock:
             if self._wire is not None or self._closed:
                 return
@@ -115,20 +118,23 @@ class SimulatedServer(Owner):
             self.record("", Event.OPENED)
 
     def die(self, reason: str = "died") -> None:
-        """Be gone, with all goals and without a word to anybody; `open` brings the server back."""
+        """Destroy the server, with all goals and without a word to the clients.
+
+        `open` brings it back.
+        """
         with self.stepper.lock:
             if self._on_death is not None:
                 self._on_death()
             self.abandon(reason)
 
     def restart(self, seconds: float) -> None:
-        """Be gone for so many wall seconds. The process lives on, whoever owns it."""
+        """Destroy the server for so many wall seconds. The process lives on."""
         with self.stepper.lock:
             self.abandon("restart")
             self.stepper.call_at(self.stepper.now() + seconds, lambda now: self.open())
 
     def close(self) -> None:
-        """Be gone for good. Safe while the executor spins and after it has stopped."""
+        """Destroy the server for good. Safe while the executor spins and after it has stopped."""
         with self.stepper.lock:
             if self._closed:
                 return
@@ -140,7 +146,7 @@ class SimulatedServer(Owner):
                 self.journal.close()
 
     def abandon(self, reason: str) -> None:
-        """Leave all goals where they are, and go."""
+        """Leave all goals where they are, and destroy the server."""
         with self.stepper.lock:
             self.record_death(reason)
             for live in self._live.values():
@@ -163,7 +169,7 @@ class SimulatedServer(Owner):
                 self.record("", Event.CLOSED, reason=reason)
 
     def strike(self, goal: Any, number: int) -> GoalFaults:
-        """Return the faults of a goal that is asked for, the server's `number`-th."""
+        """Return the faults of a requested goal, the server's `number`-th."""
         return self.faults.strike(self.name, number)
 
     def record(self, goal_id: str, event: Event, **more: object) -> None:
@@ -240,8 +246,8 @@ class SimulatedServer(Owner):
 
     def start(self, goal_id: str, goal: Any) -> None:
         with self.stepper.lock:
-            # The journal has it accepted before an older goal is aborted, so that a client which
-            # has two goals at once is seen.
+            # The journal shows the acceptance before the abort of an older goal, so that two goals
+            # at once are seen.
             wire, request = self._wire, self._intake.start(goal_id)
             if wire is None or request is None:
                 return
@@ -290,7 +296,7 @@ class _Nowhere:
 
 
 def platform_of(node: Any) -> Platform:
-    """Return what an rclpy node is to a simulation; what is a platform already, as it is."""
+    """Return the platform of an rclpy node; a platform is returned as it is."""
     if hasattr(node, "serve"):
         platform: Platform = node
         return platform

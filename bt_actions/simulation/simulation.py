@@ -1,7 +1,7 @@
-"""Simulated robots on one node: as many as there are namespaces, with one timer and no thread.
+"""Simulated robots on one node: one for each namespace, with one timer and no thread.
 
-It neither spins nor owns the node. A fault that kills a server destroys that server where the
-process is shared with a tree, and kills the process where it is the simulation's own.
+A simulation neither spins nor owns the node. A fault that kills a server destroys that server where
+the process is shared with a tree, and kills the process where it is the simulation's own.
 """
 
 from __future__ import annotations
@@ -41,12 +41,11 @@ class Simulation:
     ) -> None:
         """Serve one robot for each of `namespaces`; "" is the node's own.
 
-        `node` is an rclpy node, or another Platform.
-        `speed` is simulated seconds in one wall second, `step_period` in simulated seconds. Without
-        a `seed` one is chosen; it is logged when a fault depends on it. `in_process` False says
-        that the process is the simulation's own, to be killed by the fault `die`. `on_event` is
-        told what happens to the parts, with the namespace, on the executor's thread; once it has
-        raised it is told no more.
+        `node` is an rclpy node, or another Platform. `speed` is simulated seconds in one wall
+        second, `step_period` in simulated seconds. Without a `seed` one is chosen; it is logged
+        when a fault depends on it. `in_process` False means that the process is the simulation's
+        own, to be killed by the fault `die`. `on_event` gets the events of the parts, with the
+        namespace, on the executor's thread; after an error it gets no more.
 
         Raises FaultError for a fault that is written wrong or fits no server, ValueError for any
         other bad setting, OSError for a journal that cannot be opened.
@@ -85,7 +84,7 @@ class Simulation:
 
     @property
     def seed(self) -> int:
-        """What the dice of the faults depend on: the same seed, the same faults."""
+        """The seed of the faults' dice: the same seed, the same faults."""
         return self._faults.seed
 
     @property
@@ -96,12 +95,12 @@ class Simulation:
     def world(self, namespace: str = "") -> World:
         """Return the robot, gripper and part of a namespace, as it was given.
 
-        Raises KeyError for one that is not simulated.
+        Raises KeyError for a namespace that is not simulated.
         """
         return self._cells[namespace].world
 
     def describe(self) -> str:
-        """Say where the part is in one sentence; where there are several robots, one line each."""
+        """Say where the part is, in one sentence for each robot."""
         with self._stepper.lock:
             sentences = [(cell.namespace, cell.world.describe()) for cell in self._cells.values()]
         if len(sentences) == 1:

@@ -1,8 +1,8 @@
-"""The one timer of simulated servers: steps what moves, and calls when a time has come.
+"""The one timer of simulated servers, which steps motions and calls at due times.
 
-Everything it calls runs under `lock`, one at a time. The timer is off while nothing moves and
-nothing is due. It never blocks, and nothing that it calls can end the executor's spin: what raises
-is logged and stepped no more.
+Every call runs under `lock`, one at a time. The timer is off while nothing moves and nothing is
+due. The stepper never blocks, and no call can end the executor's spin: an error is logged, and its
+motion is stepped no more.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from bt_actions.simulation.platform import Platform
 from bt_actions.utilities.plain_text import raised
 
 CATCH_UP = 0.25
-"""Wall seconds a late timer makes up for. A process that was stopped for longer does not make its
-robots jump: they go on where they were."""
+"""Wall seconds that a late timer makes up for. The robots of a process that was stopped for
+longer do not jump: they go on where they were."""
 SHORTEST_RING = 0.008
-"""Wall seconds between two rings for steps: a higher speed makes more steps at once. Each ring has
-the executor rebuild its wait set, which for 100 servers takes milliseconds."""
+"""Wall seconds between two rings for steps: a higher speed makes more steps at once. At each
+ring the executor rebuilds its wait set, which for 100 servers takes milliseconds."""
 
 Step = Callable[[float], bool]
 
 
 class Stepper:
-    """Calls the steps of everything that moves each `step_period` of simulated time."""
+    """The caller of all motions' steps, once in each `step_period` of simulated time."""
 
     def __init__(self, platform: Platform, *, speed: float = 1.0, step_period: float = 0.1) -> None:
         """Use one timer of `platform`. `speed` is simulated seconds in one wall second."""
@@ -63,7 +63,7 @@ class Stepper:
             self._arm()
 
     def stop(self, step: Step) -> None:
-        """Call it no more."""
+        """Call this step no more."""
         with self.lock:
             self._moving.pop(step, None)
 
@@ -116,7 +116,7 @@ class Stepper:
         return self._since + (self._made + 1) * self._wall_period
 
     def _arm(self) -> None:
-        """Set the timer to the next time something is due, or switch it off."""
+        """Set the timer to the next due time, or switch it off."""
         if self._closed:
             return
         due = math.inf

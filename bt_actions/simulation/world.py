@@ -1,7 +1,7 @@
-"""One robot, one part, the stations between which it is carried. No ROS, no clock.
+"""One robot, one part, and the stations between which the part is carried. No ROS, no clock.
 
 The part moves only in the gripper: it is picked when the fingers close on it, goes where the robot
-goes, and lies where it was let go.
+goes, and lies where the fingers let it go.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from bt_actions.simulation.gripper import GripperSimulator
 from bt_actions.simulation.robot import RobotSimulator
 
 REACH = 0.05
-"""How far from its middle the gripper still gets hold of a part, m; also how large a station is."""
+"""Distance within which the gripper gets hold of a part, m; also the size of a station."""
 PART_WIDTH = 40.0
 """The opening at which the fingers touch the part, percent."""
 
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """A place on the axis that has a name."""
+    """A place on the axis with a name."""
 
     name: str
     position: float
     """m"""
     where: str
-    """As it stands in a sentence: "at the shelf"."""
+    """The place in a sentence: "at the shelf"."""
 
 
 HOME = Station("home", 0.0, "at home")
@@ -38,19 +38,19 @@ STATIONS = (HOME, PICK, SHELF)
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Where the part is now, and who holds it."""
+    """The present place of the part, and its holder."""
 
     position: float
     """m"""
     held_by: str | None
-    """The robot's name, or None when the part lies."""
+    """The robot's name, or None while the part lies."""
     station: str | None
-    """The station at which it lies; None when it is held or lies somewhere else."""
+    """The station at which the part lies; None while it is held or lies somewhere else."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorldEvent:
-    """Something happened to the part: it was picked, placed at a station, or dropped elsewhere."""
+    """An event of the part: picked, placed at a station, or dropped elsewhere."""
 
     kind: Literal["picked", "placed", "dropped"]
     robot: str
@@ -75,7 +75,7 @@ class World:
     ) -> None:
         """Put the part at `part_at` (m) and the robot at 0, its gripper closed.
 
-        `on_event` is told what happens to the part, from within the call that made it happen.
+        `on_event` gets the events of the part, from within the call that causes them.
         """
         self.name = name
         self.stations = stations
@@ -104,11 +104,14 @@ class World:
         return None
 
     def move_robot(self, share: float = 1.0) -> float:
-        """Let the robot go one step, or `share` of one, with what it holds; return its pose."""
+        """Move the robot one step, or `share` of one, with the part that it holds.
+
+        Return its pose.
+        """
         return self.robot.move_step(share)
 
     def move_gripper(self, share: float = 1.0) -> float:
-        """Let the gripper go one step, or `share` of one; return its position."""
+        """Move the gripper one step, or `share` of one; return its position."""
         position = self.gripper.move_step(share, PART_WIDTH if self._between else None)
         if self.gripper.stalled and not self._held:
             self._held = True
@@ -118,7 +121,7 @@ class World:
         return position
 
     def drop(self) -> bool:
-        """Let the part fall where the robot is; return whether it held one."""
+        """Let the part fall where the robot is; return whether the robot held one."""
         if not self._held:
             return False
         self._held = False

@@ -1,7 +1,7 @@
-"""What action servers did with the goals of a recorded run, folded from its events. No ROS.
+"""The deeds of action servers with the goals of a recorded run, folded from its events. No ROS.
 
-The events tell what the client of a server saw, so this is what is known: a goal that was canceled
-would have gone on in a way that nobody saw.
+The events tell what the client of a server saw, and no more is known: nobody saw how a canceled
+goal would have gone on.
 """
 
 from __future__ import annotations
@@ -31,9 +31,10 @@ _ENDED = {
     Outcome.ABORTED: End.ABORTED,
     Outcome.CANCELED_BY_OTHER: End.CANCELED,
 }
-"""What a server has said, also where its result tells of goals below whose end is UNKNOWN."""
+"""The ends in the words of a server, also where its result tells of goals below with an UNKNOWN
+end."""
 PROMPT = 0.1
-"""What a server did within so many seconds of being asked, it does at once."""
+"""Seconds within which a server's reaction counts as immediate."""
 THINNED = 0.25
 """Seconds between two feedback messages of a goal that have perhaps lost others between them."""
 _ON_CANCEL: dict[End | None, FaultKind] = {
@@ -50,20 +51,20 @@ class RecordedGoal:
     sent: float
     accepted: float | None = None
     canceled: float | None = None
-    """When its client did not want it any more."""
+    """The moment from which on its client did not want it any more."""
     over: float | None = None
-    """When its server had ended it, or was lost."""
+    """The moment at which its server had ended it, or was lost."""
     outcome: Outcome | None = None
     ended: End | None = None
-    """How its server ended it."""
+    """The end in the words of its server."""
     result: Value = None
     feedback: list[tuple[float, Value]] = field(default_factory=list)
-    """With the moment at which each message was told."""
+    """Each message, with the moment at which it was told."""
     away: float = 0.0
-    """Seconds for which its server was out of sight after it; infinity for good."""
+    """Seconds for which its server was out of sight afterwards; infinity for good."""
 
     def goal_changed(self, event: GoalChanged) -> None:
-        """Take in what has become of the goal."""
+        """Fold an event of the goal."""
         is_lost = event.outcome is Outcome.SERVER_LOST
         if event.state == "EXECUTING" and self.accepted is None:
             self.accepted = event.at.steady
@@ -80,13 +81,13 @@ class RecordedGoal:
 
     @property
     def began(self) -> float:
-        """When the goal was accepted, as far as is known."""
+        """The moment of acceptance, as far as is known."""
         known = (each for each in (self.accepted, self.over) if each is not None)
         return next(known, self.sent)
 
     @property
     def seconds(self) -> float:
-        """For how long the goal went until it ended by itself; infinity where it did not."""
+        """Seconds until the goal ended by itself; infinity where it did not."""
         if self.over is None or self.canceled is not None:
             return math.inf
         return self.over - self.began
@@ -98,7 +99,7 @@ class RecordedGoal:
 
     @property
     def faults(self) -> GoalFaults:
-        """What the server did with the goal beside its end, in the words of faults."""
+        """The deeds of the server beside the goal's end, as faults."""
         found = GoalFaults()
         if self.outcome is Outcome.REJECTED:
             found[FaultKind.REJECT] = None
@@ -130,31 +131,32 @@ class ServerStory:
     """One action server."""
 
     goals: list[RecordedGoal] = field(default_factory=list)
-    """In the order in which they were sent."""
+    """The goals in the order in which they were sent."""
     away: float = 0.0
-    """Seconds from the run's beginning until it came in sight; infinity where it never did."""
+    """Seconds from the run's beginning until the server came in sight; infinity where it never
+    did."""
 
 
 class RecordedRun:
-    """The servers of a run by their full names, and what of them is not known."""
+    """The servers of a run by their full names, and the gaps in what is known."""
 
     def __init__(self, events: Iterable[Event]) -> None:
         """Fold the events of one run, in their order."""
         self.began: RunBegan | None = None
         self.servers: dict[str, ServerStory] = {}
         self.lost = 0
-        """Events that are missing."""
+        """The number of missing events."""
         self.doubled: set[str] = set()
         """Servers to whose name a second one answered."""
         self._goals: dict[str, RecordedGoal] = {}
         self._absent: dict[str, list[RecordedGoal | ServerStory]] = {}
-        """Servers that are out of sight, each with the goals that it had or has had then."""
+        """Servers out of sight, each with the goals that it had or has had then."""
         for event in events:
             self._take(event)
 
     @property
     def remarks(self) -> list[str]:
-        """What cannot be played as it was, a line each."""
+        """A line for each thing that cannot be played as it was."""
         said = []
         if self.lost:
             said.append(f"{self.lost} events are missing: what servers did then is not played")
@@ -220,7 +222,7 @@ class RecordedRun:
 
 
 def is_whole(value: Value) -> bool:
-    """Whether all of a value was recorded."""
+    """Return whether all of a value was recorded."""
     if isinstance(value, dict):
         return all(map(is_whole, value.values()))
     if isinstance(value, tuple):

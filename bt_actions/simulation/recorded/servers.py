@@ -1,7 +1,7 @@
-"""Action servers that do with each goal what was done with it in a recorded run.
+"""Action servers that treat each goal as a recorded run did.
 
-A server sees goals, and no leaves: a goal is treated as the oldest recorded one of its server that
-has the same fields and was not asked for again yet; where there is none, as the oldest of those
+A server sees goals, and no leaves. A goal is treated as the oldest recorded one of its server with
+the same fields that was not asked for again yet. Without one, it is treated as the oldest of those
 that are left, with a warning. A goal beyond the recorded ones is treated as a script says.
 """
 
@@ -39,9 +39,9 @@ from bt_actions.utilities.suggest import listing
 STEP = 0.02
 """Seconds of simulated time between two looks at what is due."""
 LINGERS = 0.05
-"""Wall seconds in which the result of the goal after which a server went reaches its client."""
+"""Wall seconds in which a last result reaches its client before the server goes."""
 _OTHER_EACH_TIME = ("stamp", "caller_run")
-"""Fields by which a goal is not known again: the time in headers, and the run that sends a tree."""
+"""Fields that differ from run to run: the time in headers, and the run that sends a tree."""
 _FINISHES: dict[End | None, Finish] = {End.ABORTED: Finish.FAULT, End.CANCELED: Finish.CANCELED}
 
 
@@ -56,20 +56,20 @@ class _Rerun:
 
     @property
     def progress(self) -> float:
-        if self.recorded.outcome is Outcome.SERVER_LOST:  # at which it strikes, not half-way
+        if self.recorded.outcome is Outcome.SERVER_LOST:  # the fault strikes then, not half-way
             return float(self.done)
         seconds = self.recorded.seconds
         return min(1.0, self._elapsed / seconds) if seconds else 1.0
 
     @property
     def done(self) -> bool:
-        return self._elapsed >= self.recorded.seconds - 1e-9  # of adding up periods
+        return self._elapsed >= self.recorded.seconds - 1e-9  # the error of adding up periods
 
     def step(self, share: float) -> None:
         self._elapsed += self._period * share
 
     def due(self) -> list[Value]:
-        """Take the feedback whose time has come; at the end all that is left."""
+        """Take the feedback whose time has come; at the end all the rest."""
         now = math.inf if self.done else self._elapsed
         found = []
         while self._left and self._left[0][0] <= now:
@@ -89,18 +89,21 @@ class RecordedServer(ScriptedServer):
         script: Script | None = None,
         **settings: Any,
     ) -> None:
-        """`script` is for goals beyond the recorded; `settings` are those of ScriptedServer."""
+        """Serve recorded goals; `script` is for goals beyond those.
+
+        `settings` are those of ScriptedServer.
+        """
         self.left = list(goals)
-        """Those that were not asked for again."""
+        """The recorded goals that were not asked for again."""
         self.recorded = len(goals)
         self._is_secret = any(each.goal == HIDDEN for each in goals)
         self._taken: dict[int, RecordedGoal] = {}
-        """By the goal's message, from its request until it begins."""
+        """The recorded goals by the id of the message, from its request until it begins."""
         super().__init__(node, action_type, name, script, **settings)
 
     def strike(self, goal: Any, number: int) -> GoalFaults:
         faults = super().strike(goal, number)
-        self._taken.pop(id(goal), None)  # of a message that was here before, and never began
+        self._taken.pop(id(goal), None)  # an earlier message with this id never began
         recorded = self._take(snapshot(goal), number)
         if recorded is None:
             return faults
@@ -143,7 +146,7 @@ class RecordedServer(ScriptedServer):
             self.restart(away)
 
     def _take(self, told: Value, number: int) -> RecordedGoal | None:
-        """Return the recorded goal that a new one is treated as, and say where they differ."""
+        """Return the recorded goal for a new one, and warn where they differ."""
         new = f"{self.name}: goal {number}{'' if self._is_secret else f', {shorten(told)},'}"
         if not self.left:
             self._warn(f"{new} is beyond the {self.recorded} recorded: its answer is made up")
@@ -170,7 +173,7 @@ class RecordedServer(ScriptedServer):
         return message
 
     def _warn(self, text: str) -> None:
-        self._log.warning(clean(text))  # names and values of a recording may be anybody's
+        self._log.warning(clean(text))  # names and values of a recording may be a stranger's
 
 
 class RecordedServers:
@@ -178,9 +181,9 @@ class RecordedServers:
 
     `events` are those of the run, in order, and `node` is an rclpy node or a VirtualNetwork.
     `script` is for goals beyond the recorded ones; without one they succeed after half a second,
-    with empty messages. `speed` shortens what servers take, and not how long they were out of
-    sight. `remarks` says what cannot be as it was; what differs later is in the log. The topic of
-    a simulated robot's battery is there, too: the battery is full.
+    with empty messages. `speed` shortens the time of goals, and not the time of a server out of
+    sight. `remarks` has what cannot be as it was; later differences are in the log. The topic of a
+    simulated robot's battery is there, too: the battery is full.
 
     Raises FaultError for a fault that fits no server.
     """
@@ -198,11 +201,11 @@ class RecordedServers:
         script: Script | None = None,
         result_timeout: float = RESULT_TIMEOUT,
     ) -> None:
-        """Serve each action that `tree` has."""
+        """Serve each action of `tree`."""
         platform = platform_of(node)
         self.run = RecordedRun(events)
         self.servers: list[RecordedServer] = []
-        """Those that are, or have been, in sight."""
+        """The servers that are, or have been, in sight."""
         self._log = platform.log
         self._stepper = Stepper(platform, speed=speed, step_period=STEP)
         self._journal = Journal(journal, clock=platform.now, on_error=self._log.error)
@@ -227,7 +230,7 @@ class RecordedServers:
             if name.endswith("/move_robot")
         ]
         self.remarks = [clean(each) for each in (*self.run.remarks, *self._told(types))]
-        """What cannot be as it was, a line each."""
+        """A line for each thing that cannot be as it was."""
         for name, kind in types.items():
             self._open(kind, name, self.run.servers.get(name, ServerStory()))
 
@@ -272,14 +275,14 @@ class RecordedServers:
 
 
 def _key(goal: Value) -> Value:
-    """What a goal is known by in another run."""
+    """Return the part of a goal that is the same in another run."""
     if isinstance(goal, dict):
         return {name: _key(each) for name, each in goal.items() if name not in _OTHER_EACH_TIME}
     return tuple(map(_key, goal)) if isinstance(goal, tuple) else goal
 
 
 def _opened(value: Value) -> Value:
-    """A snapshot with the beginnings of what was cut."""
+    """Return a snapshot with the beginnings of cut values."""
     if isinstance(value, Cut):
         return _opened(value.head)
     if isinstance(value, dict):

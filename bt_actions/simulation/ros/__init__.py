@@ -1,1 +1,1 @@
-"""Simulated servers on an rclpy node: nothing of a robot, and no fault, is decided here."""
+"""Simulated servers on an rclpy node. Nothing of a robot, and no fault, is decided here."""

@@ -1,7 +1,7 @@
-"""Simulated servers on an rclpy node: its timers, topics and action servers.
+"""The platform of simulated servers on an rclpy node: timers, topics and action servers.
 
-It neither spins nor owns the node. What a node's servers do is never done twice at a time: all
-belong to one callback group, as a second thread would only wait for their lock.
+The platform neither spins nor owns the node. All servers of a node belong to one callback group: a
+second thread would only wait for their lock.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from bt_actions.simulation.platform import RequestHandler, SimulationLog
 from bt_actions.simulation.ros.wire import InterceptedActionServer
 
 SHORTEST_WAIT = 0.0001
-"""Seconds that a timer waits in any case."""
+"""Seconds of any wait of a timer, at least."""
 
 
 class NodePlatform:
-    """See the head of this file."""
+    """The platform of one rclpy node."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
@@ -86,7 +86,7 @@ class NodeTimer:
         self.rclpy_timer.reset()
 
     def destroy(self) -> None:
-        """Safe while the executor spins and after it has stopped."""
+        """Destroy the timer. Safe while the executor spins and after it has stopped."""
         with contextlib.suppress(InvalidHandle):  # the node was destroyed before
             self.rclpy_timer.cancel()
             self._node.destroy_timer(self.rclpy_timer)
@@ -109,6 +109,6 @@ class NodePublisher:
         self._publisher.publish(message)
 
     def destroy(self) -> None:
-        """Safe while the executor spins and after it has stopped."""
+        """Destroy the publisher. Safe while the executor spins and after it has stopped."""
         with contextlib.suppress(InvalidHandle):  # the node was destroyed before
             self._node.destroy_publisher(self._publisher)

@@ -1,8 +1,10 @@
-"""The server side of an action on rclpy: an action server whose requests others see first.
+"""The server side of an action on rclpy.
 
-What the middleware brings is shown to a `RequestHandler`, which may keep it: to lose it, or give it
-back later. Goals are executed by that server: `start` only changes the state, `finish` sends the
-result. Nothing is decided here.
+An action server that shows its requests to a handler first.
+
+A `RequestHandler` may keep a request: to lose it, or to give it back later. rclpy's server keeps
+the states of goals: `start` only changes the state, `finish` sends the result. Nothing is decided
+here.
 """
 
 from __future__ import annotations
@@ -48,7 +50,7 @@ class Taken:
 
 
 class InterceptedActionServer(ClosableActionServer):
-    """See the head of this file."""
+    """An action server with a handler in front."""
 
     def __init__(
         self, node: Node, action_type: Any, name: str, server: RequestHandler, **settings: Any
@@ -66,7 +68,7 @@ class InterceptedActionServer(ClosableActionServer):
         )
 
     async def execute(self, taken_data: Any) -> None:
-        """Answer what was taken, each request on its own, unless the server keeps it."""
+        """Answer the taken requests, one by one, unless the handler keeps them."""
         for kind, taken in taken_data.items():
             if kind == "expired":
                 await super().execute({kind: taken})
@@ -89,11 +91,11 @@ class InterceptedActionServer(ClosableActionServer):
 
     def end(self, goal_id: str, status: int) -> int:
         handle = self._handle_of(goal_id)
-        with contextlib.suppress(RCLError):  # it cannot be reached from the one it has
+        with contextlib.suppress(RCLError):  # no way from its present status to this one
             if status == STATUS_SUCCEEDED:
                 handle.succeed()
             elif status == STATUS_CANCELED:
-                if not handle.is_cancel_requested:  # nobody has asked: it cancels by itself
+                if not handle.is_cancel_requested:  # nobody has asked: the goal cancels by itself
                     handle._update_state(GoalEvent.CANCEL_GOAL)  # noqa: SLF001
                 handle.canceled()
             else:
@@ -109,7 +111,7 @@ class InterceptedActionServer(ClosableActionServer):
     def _soon(self, work: Callable[..., Coroutine[Any, Any, None]], *arguments: Any) -> None:
         """Have the executor do work that waits for nothing, unless it is shut down before.
 
-        Of a coroutine that it has and never begins Python would warn.
+        Python would warn of a coroutine that the executor has and never begins.
         """
         if not self.gone and (executor := self._node.executor) is not None:
             executor.create_task(partial(_to_its_end, self.guarded, work, *arguments))
