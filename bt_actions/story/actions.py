@@ -1,4 +1,7 @@
-"""What one action leaf did in a run, and each of its goals. Folded from events; see state.py."""
+"""The story of one action leaf in a run, and of each of its goals. Folded from events.
+
+See state.py.
+"""
 
 from __future__ import annotations
 
@@ -10,27 +13,27 @@ from bt_actions.goals.policy import End, Outcome
 
 DONE = "DONE"
 UNSENT = ("QUEUED", "WAITING_FOR_SERVER")
-"""States of a goal before its request goes out."""
+"""The states of a goal before its request goes out."""
 
 
 @dataclass(slots=True)
 class GoalStory:
-    """One goal: what was sent, and what became of it."""
+    """One goal: its message, its state, its outcome and its end."""
 
     latest: GoalChanged
     since: Moment
-    """When its present state began."""
+    """The moment at which its present state began."""
     began: Moment
     accepted: Moment | None = None
     goal: Value = None
     feedback: FeedbackCame | None = None
     result: Value = None
     verdict: AttemptEnded | None = None
-    """What the leaf made of it."""
+    """The leaf's judgement of it."""
 
     @property
     def outcome(self) -> Outcome | None:
-        """What the leaf says, else the goal itself."""
+        """The outcome in the leaf's judgement, or else the goal's own."""
         return self.latest.outcome if self.verdict is None else self.verdict.outcome
 
     @property
@@ -41,11 +44,11 @@ class GoalStory:
 
     @property
     def in_doubt(self) -> bool:
-        """Whether it has not begun as far as its server knows, which may change."""
+        """Whether the goal has not begun as far as its server knows, which may change."""
         return self.latest.end is End.NEVER_STARTED and self.latest.state != DONE
 
     def goal_changed(self, event: GoalChanged) -> None:
-        """Take in what has become of it."""
+        """Fold an event of the goal."""
         if event.state != self.latest.state:
             self.since = event.at
             if event.state == "EXECUTING":
@@ -57,29 +60,29 @@ class GoalStory:
 
 @dataclass(slots=True)
 class ActionStory:
-    """All that one action leaf did in a run, over all its visits."""
+    """The whole story of one action leaf in a run, over all its visits."""
 
     node: Node
     path: tuple[str, ...]
     server: str
     attempts: int = 0
-    """Goals wished for in all visits."""
+    """Goals in all visits, sent or not."""
     visits: int = 0
     failed: int = 0
     """Visits that ended in FAILURE."""
     outcome: Outcome | None = None
-    """Of the latest attempt; None while it is under way."""
+    """The outcome of the latest attempt; None while it is under way."""
     end: End | None = None
     reason: str = ""
     begun: float = 0.0
-    """When the latest visit began, in seconds on the steady clock."""
+    """The beginning of the latest visit, in seconds on the steady clock."""
     counted: float = 0.0
     """Seconds of the visits before the latest."""
     duration: float = 0.0
     """Seconds from the first wish to the last outcome of each visit, summed up."""
     goals: dict[str, GoalStory] = field(default_factory=dict)
-    """By id: those of the latest visit, and older ones of which more may come, or nobody knows the
-    end."""
+    """The goals of the latest visit by id, and older ones that may have more events, or an
+    unknown end."""
     latest: GoalStory | None = None
 
     @property
@@ -99,13 +102,13 @@ class ActionStory:
 
     @property
     def of(self) -> int:
-        """How many attempts a visit may have."""
+        """The number of attempts that a visit may have."""
         attempts = self.node.settings.get("attempts", 1)
         return attempts if isinstance(attempts, int) else 1
 
     @property
     def open(self) -> list[GoalChanged]:
-        """Of each goal of which more may come, the latest."""
+        """The latest event of each goal that may have more."""
         changes = [goal.latest for goal in self.goals.values()]
         return [each for each in changes if each.state != DONE or each.end is End.SERVER_GONE]
 
@@ -120,7 +123,7 @@ class ActionStory:
 
     @property
     def given_up(self) -> list[GoalChanged]:
-        """Of each goal whose end nobody will tell any more, the latest."""
+        """The latest event of each goal whose end will stay unknown."""
         changes = [goal.latest for goal in self.goals.values()]
         return [each for each in changes if each.state == DONE and each.end is End.UNKNOWN]
 
@@ -136,7 +139,7 @@ class ActionStory:
 
     @property
     def waited_for(self) -> int:
-        """How many goals of this leaf a run that is over waits for."""
+        """The number of this leaf's goals that an ended run waits for."""
         return len(self.live) + sum(each.end is End.NEVER_STARTED for each in self.open)
 
     @property
@@ -146,7 +149,7 @@ class ActionStory:
         return [goal for goal in self.goals.values() if goal.began.steady >= begun]
 
     def goal_changed(self, event: GoalChanged) -> None:
-        """Take in one event of a goal of this leaf."""
+        """Fold an event of a goal of this leaf."""
         goal = self.goals.get(event.goal_id)
         if goal is None:
             goal = self._begin(event)
@@ -160,7 +163,7 @@ class ActionStory:
         self.reason = goal.reason
 
     def _begin(self, event: GoalChanged) -> GoalStory:
-        if event.outcome is not None and self.latest is not None:  # of a visit that is forgotten
+        if event.outcome is not None and self.latest is not None:  # the goal's visit is forgotten
             late = self.goals[event.goal_id] = GoalStory(event, event.at, event.at)
             return late
         if event.attempt <= 1:
@@ -187,14 +190,14 @@ class ActionStory:
             self.outcome, self.reason = goal.outcome, goal.reason
 
     def leave(self, now: float) -> None:
-        """Its goals are waited for no longer: how they end is not known."""
+        """Stop to wait for its goals: their ends stay unknown."""
         if self.outcome is None:
             self.duration = self.seconds(now)
             self.outcome = Outcome.CANCELED
         self.end = End.UNKNOWN
 
     def seconds(self, now: float) -> float:
-        """Return how long it took so far, a visit that is not over included."""
+        """Return the seconds that the leaf took so far, an unfinished visit included."""
         if self.outcome is not None:
             return self.duration
         return self.counted + max(0.0, now - self.begun)

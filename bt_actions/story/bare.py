@@ -12,22 +12,22 @@ from bt_actions.story.failures import Warned
 from bt_actions.story.state import State
 
 _TEXTS = {"message": outcome_of, "warning": lambda text: ""}
-"""Fields of a state's parts that may hold values, and what stays of each."""
+"""Fields of a state's parts that may hold values, each with what stays of it."""
 _VALUES = ("goal", "result")
 
 
 def stripped(state: State) -> State:
-    """Return a state that tells as much as it would if it had seen bare events alone."""
+    """Return the state that bare events alone would have given."""
     found: State = _Stripping().of(state)
     return found
 
 
 class _Stripping:
-    """What several places of a state hold stays one object."""
+    """The stripping of one state: an object in several places stays one object."""
 
     def __init__(self) -> None:
         self._done: dict[int, tuple[object, Any]] = {}
-        """By id the object, which so lives on, and what became of it."""
+        """Each object by its id, with its stripped copy; the entry keeps the object alive."""
 
     def of(self, held: Any) -> Any:
         if id(held) not in self._done:

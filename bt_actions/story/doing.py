@@ -1,7 +1,7 @@
-"""What a running node does, since when, until when and by which rule: the one wording of it.
+"""The one wording of a running node's work: its time, its limit, and the rule of that limit.
 
-A deadline that stands still, as its tree is paused or this process was stopped, is not known of
-here, nor a ROS clock that runs faster: it then falls due at another time than is said.
+A deadline that stands still, as its tree is paused or this process was stopped, is not known here,
+and neither is a ROS clock that runs faster: such a deadline falls due at another time than is said.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ _STATES = {
     "EXECUTING": ("executing", "on", "result"),
     "CANCELING": ("canceling", "on", "cancel"),
 }
-"""The states of a goal in words, what leads from those to its server, and the field of Timeouts
+"""The states of a goal in words, the preposition before its server, and the field of Timeouts
 that bounds each."""
 
 
 class Doing(NamedTuple):
-    """What a node does, in parts; "" for a part that is not known, or needs a time."""
+    """The work of a node, in parts; "" for a part that is not known, or needs a time."""
 
     what: str = ""
     """``executing``"""
@@ -39,7 +39,7 @@ class Doing(NamedTuple):
     until: str = ""
     """``6.1 s left (timeout.result)``"""
     told: str = ""
-    """Its feedback, or what the node says of itself."""
+    """Its feedback, or the node's own message."""
 
     def __str__(self) -> str:
         does = " ".join(part for part in (self.what, self.where, self.since) if part)
@@ -48,7 +48,7 @@ class Doing(NamedTuple):
 
 
 def doing(state: State, story: NodeStory, now: float | None = None) -> Doing:
-    """Return what a running node does; times only for `now`, in seconds on the steady clock."""
+    """Return the work of a running node; times only for `now`, in seconds on the steady clock."""
     number, lasting = story.node.id, state.lasting
     if lasting is not None and lasting.node == number:
         begun = lasting.at.steady - lasting.seconds
@@ -75,25 +75,25 @@ def doing(state: State, story: NodeStory, now: float | None = None) -> Doing:
 
 
 def did_text(stopped: Failure) -> str:
-    """Say what a node did that was stopped as the run was to end, and for how long."""
+    """Say what a node did that the end of the run has stopped, and for how long."""
     what = "in its tick" if stopped.in_tick else "running"
     told = "" if stopped.in_tick or stopped.attempts else stopped.message
     return str(Doing(what, since=_for(0.0, stopped.ran), told=told))
 
 
 def goal_doing(state: str, server: str, attempt: int, of: int) -> Doing:
-    """Return where a goal stands that has no outcome."""
+    """Return the standing of a goal without an outcome."""
     what, to, _ = _STATES.get(state, (state.lower(), "on", ""))
     return Doing(what, f"{to} {server}".lstrip(), tries=_tries(attempt, of))
 
 
 def _tries(attempt: int, of: int) -> str:
-    """Return which attempt it is; nothing of the first."""
+    """Say which attempt it is, but for the first."""
     return f"attempt {attempt} of {of}" if attempt > 1 else ""
 
 
 def _deadlines(action: ActionStory | None, now: float) -> Iterator[tuple[float, str]]:
-    """Yield the seconds that are left of each deadline of an action's goal, and its name."""
+    """Yield the seconds left of each deadline of an action's goal, and its name."""
     goal = action.latest if action is not None else None
     timeouts = action.node.settings.get("timeouts") if action is not None else None
     if goal is None or not isinstance(timeouts, dict):
@@ -108,7 +108,7 @@ def _deadlines(action: ActionStory | None, now: float) -> Iterator[tuple[float, 
 
 
 def _own_times(state: State, story: NodeStory, now: float) -> Iterator[tuple[float, str]]:
-    """Yield the seconds that are left of a node's own time; of a leaf, also of what holds it."""
+    """Yield the seconds left of a node's own time; for a leaf, also of the nodes that hold it."""
     for each in (story, *(state.above(story.node.id) if story.is_leaf else ())):
         if each.due_in is not None and each.since is not None:
             left = each.since.steady + each.due_in - now

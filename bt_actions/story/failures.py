@@ -1,4 +1,4 @@
-"""One node that failed, or was stopped, with what led to it. Folded from events; see state.py."""
+"""One node that failed, or was stopped, with its causes. Folded from events; see state.py."""
 
 from __future__ import annotations
 
@@ -20,18 +20,17 @@ class Failure:
     items: tuple[tuple[Node, RoundBegan], ...] = ()
     """The rounds of the loops that it failed in, the outermost first."""
     action: ActionStory | None = None
-    """What the action did; None for a node that is no action."""
+    """The story of the action; None for a node that is no action."""
     attempts: tuple[GoalStory, ...] = ()
-    """Of an action: the goals of the visit that failed."""
+    """The goals of an action's visit that failed."""
     below: tuple[Failure, ...] = ()
-    """What the node has stopped, where its time was over, or its guard did not hold."""
+    """The nodes that it has stopped, as its time was over, or its guard did not hold."""
     by: Node | None = None
     """The node that went on in spite of it; None while it is passed on upwards."""
     ran: float | None = None
-    """Of a node that was stopped as the run was to end, and has not failed: the seconds that it
-    had run."""
+    """The seconds that a node had run when the end of the run stopped it; None after a failure."""
     in_tick: bool = False
-    """Whether it spent these in one tick, which held up the run."""
+    """Whether the node spent these in one tick, which held up the run."""
 
     @property
     def path(self) -> tuple[str, ...]:
@@ -46,7 +45,7 @@ class Failure:
 
 @dataclass(frozen=True, slots=True)
 class Warned:
-    """A leaf that succeeded in something that may not be what was meant."""
+    """A leaf that succeeded in something that may not be meant."""
 
     node: Node
     path: tuple[str, ...]

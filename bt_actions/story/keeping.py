@@ -1,8 +1,8 @@
 """A state as JSON and back: for a reader that has not seen the events before.
 
 Each field is written as its type says, and values as events/wire.py writes them. Several places of
-a state hold the same node, the same story of an action or a goal, or the same failure: each of
-these is written once, in a list of objects, and stands elsewhere as its number there.
+a state hold the same node, the same story of an action or a goal, or the same failure. Each of
+these is written once, in a list of objects, and every other place has its number there.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _NO_STATE = (
     ArithmeticError,
     RecursionError,
 )
-"""What a text raises that is no state."""
+"""The errors of a text that is no state."""
 _ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 _Writer = Callable[[Any, "_Objects"], Any]
 _Reader = Callable[[Any, list[Any]], Any]
@@ -46,11 +46,11 @@ def to_json(state: State) -> str:
     objects = _Objects()
     data = _codec(State)[0](state, objects)
     pieces = _ENCODER.iterencode({"objects": objects.written, "state": data})
-    return "".join(pieces)  # json.dumps would keep Python's lock throughout: a tick may want it
+    return "".join(pieces)  # json.dumps would hold Python's lock throughout: a tick may want it
 
 
 def from_json(text: str) -> State:
-    """Return the state that was written; raises WireError."""
+    """Return the state of a text; raises WireError."""
     try:
         data, objects = json.loads(text), list[Any]()
         for name, fields in data["objects"]:
@@ -67,7 +67,7 @@ def from_json(text: str) -> State:
 
 
 def _is_tree(nodes: dict[int, NodeStory]) -> bool:
-    """Whether all nodes below one have higher numbers, and are below no other one."""
+    """Return whether all nodes below one have higher numbers, and one parent each."""
     return all(
         number == story.node.id
         and (story.node.parent or 0) < number
@@ -81,7 +81,7 @@ def _is_tree(nodes: dict[int, NodeStory]) -> bool:
 
 
 class _Objects:
-    """Writes shared objects, each behind those that it holds."""
+    """The writer of shared objects, each behind those that it holds."""
 
     def __init__(self) -> None:
         self.written: list[tuple[str, Any]] = []
@@ -98,7 +98,7 @@ class _Objects:
 
 @lru_cache(maxsize=256)
 def _codec(hint: Any) -> tuple[_Writer, _Reader]:
-    """How a field of this type is written, and read."""
+    """Return the writer and the reader of fields of this type."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if hint in _SHARED.values():
         return (lambda held, objects: objects.number_of(held)), (

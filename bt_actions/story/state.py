@@ -1,4 +1,4 @@
-"""Where a run stands, folded from its events: nodes, actions, failures, variables, how it ended.
+"""The state of a run, folded from its events: nodes, actions, failures, variables, the end.
 
 All that is shown or decided of a run reads from here: terminal, `--json`, table, exit code,
 `/rosout`, diagnostics, RunTree's feedback and result, the virtual runner.
@@ -43,23 +43,23 @@ from bt_actions.utilities.names import told_apart
 
 OVER = (Status.SUCCESS, Status.FAILURE)
 KEPT = 100
-"""Failures that were dealt with and are kept; older ones are counted."""
+"""Dealt-with failures that are kept; older ones are counted."""
 
 
 @dataclass(slots=True)
 class NodeStory:
-    """One node of the tree, as it was last told of."""
+    """One node of the tree, as its latest event left it."""
 
     node: Node
     children: list[int] = field(default_factory=list)
     status: Status = Status.INVALID
     message: str = ""
     since: Moment | None = None
-    """When it got its status."""
+    """The moment at which it got its status."""
     visits: int = 0
-    """How often it has begun."""
+    """The number of its visits."""
     ended: int = 0
-    """The number of the event with which its visit before the latest ended."""
+    """The number of the event that ended its visit before the latest."""
     number: int = 0
     """The number of its latest event."""
     warning: str = ""
@@ -68,7 +68,7 @@ class NodeStory:
     round: RoundBegan | None = None
     """The latest round of a loop."""
     pending: list[Failure] = field(default_factory=list)
-    """Failures at or below it that nobody above it has dealt with yet."""
+    """Failures at or below it that no node above it has dealt with yet."""
 
     @property
     def is_left_out(self) -> bool:
@@ -77,12 +77,12 @@ class NodeStory:
 
     @property
     def has_failed(self) -> bool:
-        """Whether the node has ended in a FAILURE that is one."""
+        """Whether the node has ended in a FAILURE, and was not left out."""
         return self.status is Status.FAILURE and not self.is_left_out
 
     @property
     def is_leaf(self) -> bool:
-        """Whether it has no children."""
+        """Whether the node has no children."""
         return not self.children
 
 
@@ -92,22 +92,22 @@ class State:
 
     began: RunBegan | None = None
     nodes: dict[int, NodeStory] = field(default_factory=dict)
-    """By number, parents before their children."""
+    """The nodes by number, parents before their children."""
     root: int = 1
     now: Moment | None = None
-    """Of the latest event."""
+    """The moment of the latest event."""
     finished: TreeFinished | None = None
     ended: RunEnded | None = None
     stop: StopWanted | None = None
-    """What asked the run to end; the first counts."""
+    """The first request to end the run."""
     stopped: list[Failure] = field(default_factory=list)
-    """What ran when the run was asked to end."""
+    """The nodes that ran when the run was asked to end."""
     lasting: TickLasts | None = None
     """The node in whose tick the tree is, where that lasts."""
     leaves_ended: int = 0
-    """How often a leaf has ended."""
+    """The number of ends of leaves."""
     changes: int = 0
-    """How often a leaf has another status, a tick lasts or is over, the run is paused."""
+    """The number of new statuses of leaves, of lasting ticks and their ends, and of pauses."""
     abandoned: bool = False
     """Whether goals that are being drained are waited for no longer."""
     paused: bool = False
@@ -116,27 +116,27 @@ class State:
     variables: dict[str, VariableWritten] = field(default_factory=dict)
     servers: dict[str, ServerSeen] = field(default_factory=dict)
     dealt_with: deque[Failure] = field(default_factory=lambda: deque(maxlen=KEPT))
-    """Failures that somebody went on in spite of, in the order in which that happened."""
+    """Dealt-with failures, in the order of the dealing."""
     dealt_with_in_all: int = 0
     _actions: dict[int, ActionStory] = field(default_factory=dict)
     _warnings: dict[int, Warned] = field(default_factory=dict)
     _names: dict[int, str] = field(default_factory=dict)
-    """Of all nodes, also those that are in the tree no more."""
+    """The names of all nodes, also of those that are out of the tree."""
     _called: dict[int, str] = field(default_factory=dict)
 
     @property
     def simulation(self) -> str:
-        """What stood in for the world, as options of the command line; "" of a run in the world."""
+        """The stand-in for the world, as options of the command line; "" for a run in the world."""
         return self.began.where.get("simulation", "") if self.began is not None else ""
 
     # Taking in
 
     def fold(self, event: Event) -> None:
-        """Take in one event, in the order of their numbers."""
+        """Fold one event, in the order of their numbers."""
         self.now = event.at
         node = getattr(event, "node", None)
         if isinstance(node, int) and node not in self.nodes:
-            return  # of a node that is gone, or of a run whose beginning this reader has not seen
+            return  # the node is gone, or this reader has not seen the run's beginning
         self.changes += isinstance(event, TickLasts | Paused)
         match event:
             case NodeChanged():
@@ -173,7 +173,7 @@ class State:
                     and stop.at.number > self.finished.at.number
                 )
                 self.__init__()  # type: ignore[misc]
-                if is_new:  # what came while the tree was set up
+                if is_new:  # events of the setup
                     self.stop, self.abandoned, self.servers = stop, abandoned, servers
                 self.now, self.began = event.at, event
                 self._add(event.nodes)
@@ -245,7 +245,7 @@ class State:
         story.pending = passed or [self._failure(story, event.message)]
 
     def _stop(self, now: float) -> None:
-        """Take note of what runs, as the run is to end."""
+        """Take note of the running nodes, as the run is to end."""
         lasting = self.lasting
         self.stopped = [self._failure(each, each.message) for each in self.running]
         for failure, story in zip(self.stopped, self.running, strict=True):
@@ -270,7 +270,7 @@ class State:
         )
 
     def _stopped_below(self, story: NodeStory) -> list[NodeStory]:
-        """The leaves that a node has stopped in the visit that has failed."""
+        """Return the leaves that a node has stopped in the visit that has failed."""
         found, waiting = list[NodeStory](), list(story.children)
         while waiting:
             below = self.nodes[waiting.pop()]
@@ -281,14 +281,14 @@ class State:
         return found[:2]
 
     def _settle(self, child: int, by: int) -> None:
-        """What failed at or below `child` did not make `by` fail."""
+        """Take failures at or below `child` as dealt with: they did not make `by` fail."""
         story = self.nodes[child]
         if story.pending:
             self._deal_with(story.pending, by)
             story.pending = []
 
     def _deal_with(self, failures: list[Failure], by: int | None) -> None:
-        if by not in self.nodes or self.nodes[by].node.kind == "invert":  # to which it is none
+        if by not in self.nodes or self.nodes[by].node.kind == "invert":  # for it a failure is none
             return
         for failure in failures:
             failure.by = self.nodes[by].node
@@ -298,14 +298,14 @@ class State:
     # Asking
 
     def action(self, node: int) -> ActionStory:
-        """Return what an action leaf did; a new story at its first event."""
+        """Return the story of an action leaf; a new story at its first event."""
         if node not in self._actions:
             of = self.nodes[node].node
             self._actions[node] = ActionStory(of, self.path(node), of.server)
         return self._actions[node]
 
     def acts(self, node: int) -> bool:
-        """Whether a node is an action of which something was told."""
+        """Return whether a node is an action with an event."""
         return node in self._actions
 
     @property
@@ -320,7 +320,10 @@ class State:
 
     @property
     def servers_gone(self) -> list[str]:
-        """The actions with a goal whose server went away; one that only stood still goes on."""
+        """The actions with a goal whose server went away.
+
+        A server that only stood still goes on.
+        """
         return [
             f"{self.called(action.node.id)} on {action.server}"
             for action in self._actions.values()
@@ -329,34 +332,34 @@ class State:
 
     @property
     def status(self) -> Status:
-        """The status that the run has ended with; INVALID before that, and where it was stopped."""
+        """The status that the run has ended with; INVALID before that, and after a stop."""
         return self.finished.status if self.finished is not None else Status.INVALID
 
     @property
     def outputs(self) -> Mapping[str, Value]:
-        """What the tree gave its outputs; only once it has succeeded."""
+        """The outputs of the tree, once it has succeeded."""
         return self.finished.outputs if self.finished is not None else {}
 
     @property
     def decided(self) -> bool:
-        """Whether the tree has come to its end, be it that goals of it have not."""
+        """Whether the tree has come to its end, with or without all of its goals."""
         return self.status_of(self.root) in OVER
 
     @property
     def tree(self) -> str:
-        """The tree's name."""
+        """The name of the tree."""
         return self.began.tree if self.began is not None else ""
 
     @property
     def started(self) -> float:
-        """When the run began, in seconds on the steady clock."""
+        """The beginning of the run, in seconds on the steady clock."""
         if self.began is not None:
             return self.began.at.steady
         return self.latest
 
     @property
     def latest(self) -> float:
-        """When the latest event happened, in seconds on the steady clock."""
+        """The moment of the latest event, in seconds on the steady clock."""
         return self.now.steady if self.now is not None else 0.0
 
     def since_began(self, now: float) -> float:
@@ -369,12 +372,12 @@ class State:
         return max(0.0, self.latest - self.started)
 
     def status_of(self, node: int) -> Status:
-        """Return the status that a node was last told with."""
+        """Return the latest status of a node."""
         story = self.nodes.get(node)
         return story.status if story is not None else Status.INVALID
 
     def is_begun(self, node: int) -> bool:
-        """Whether a node did anything in the latest visits, and rounds, of all that holds it."""
+        """Return whether a node did anything in the latest visits and rounds of all its holders."""
         number = self.nodes[node].number
         return all(
             number > above.ended and (above.round is None or number > above.round.at.number)
@@ -382,7 +385,7 @@ class State:
         )
 
     def above(self, node: int) -> Iterator[NodeStory]:
-        """Yield what holds a node, upwards."""
+        """Yield the nodes that hold a node, upwards."""
         parent = self.nodes[node].node.parent
         while parent is not None and parent in self.nodes:
             yield self.nodes[parent]
@@ -416,7 +419,7 @@ class State:
         return tuple(reversed(names))
 
     def called(self, node: int) -> str:
-        """Return a leaf's name; where others have it, behind what of its path tells them apart."""
+        """Return a leaf's name; where others have it, behind the telling part of its path."""
         if not self._called:
             paths = {key: self.path(key) for key, each in self.nodes.items() if each.is_leaf}
             names = told_apart(paths.values())
@@ -425,7 +428,7 @@ class State:
 
     @property
     def running(self) -> list[NodeStory]:
-        """The leaves that run, deepest first; and a node in whose tick the tree is for long."""
+        """The running leaves, deepest first, and a node in whose tick the tree stays for long."""
         inside = self.lasting.node if self.lasting is not None else 0
         holders = {each.node.id for each in self.above(inside)} if inside in self.nodes else set()
         leaves = [
@@ -442,7 +445,7 @@ class State:
 
     @property
     def retries(self) -> bool:
-        """Whether an action that runs is not at its first attempt."""
+        """Whether a running action is not at its first attempt."""
         tried = (self._actions.get(each.node.id) for each in self.running)
         return any(action is not None and action.attempt > 1 for action in tried)
 
@@ -474,5 +477,5 @@ class State:
 
     @property
     def warnings(self) -> list[Warned]:
-        """The leaves that succeeded in something that may not be what was meant, and why."""
+        """The leaves that succeeded in something that may not be meant, and why."""
         return list(self._warnings.values())

@@ -1,4 +1,4 @@
-"""A run's actions as a table, in lines."""
+"""The table of a run's actions, in lines."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bt_actions.story.actions import ActionStory
 from bt_actions.utilities.shorten import MESSAGE
 
 STOOD = (Outcome.SUCCEEDED, Outcome.UNEXPECTED_RESULT, Outcome.ABORTED)
-"""Outcomes that say how the goal ended on its server."""
+"""Outcomes that follow from how the goal ended on its server."""
 
 
 def table(
@@ -20,7 +20,7 @@ def table(
 ) -> list[str]:
     """Return actions as lines under a head, each as it stands at `now` on the steady clock.
 
-    Names, which `names` gives, are cut so that lines fit into `width`.
+    `names` gives their names, which are cut so that lines fit into `width`.
     """
     body = [
         (
@@ -42,9 +42,9 @@ def _tries(action: ActionStory) -> str:
 
 
 def verdict(action: ActionStory) -> str:
-    """Return the outcome for the table: where the goal stands while there is none.
+    """Return the outcome for the table, or the goal's state while there is none.
 
-    The end is told where the goal may still be running, or run again, and where the robot did what
+    The end is added where the goal may still be running, or run again, and where the robot did what
     nobody waited for.
     """
     if action.outcome is None:

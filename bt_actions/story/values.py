@@ -1,4 +1,4 @@
-"""Values of events in words: of a message its fields, of a long value the beginning."""
+"""Values of events in words: the fields of a message, the beginning of a long value."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LONG = 80
 """Characters of one value."""
 
 Constants = Mapping[str, Value]
-"""By field the names of numbers."""
+"""The names of numbers, by field."""
 
 
 def feedback_text(action: ActionStory) -> str:
@@ -25,7 +25,7 @@ def feedback_text(action: ActionStory) -> str:
 
 
 def round_text(begun: RoundBegan, of: str = "") -> str:
-    """Return ``item 2 of 3 (4.5)``, or ``round 2``; `of` says of which loop."""
+    """Return ``item 2 of 3 (4.5)``, or ``round 2``; `of` names the loop."""
     word = "round" if begun.item is None else "item"
     most = "" if begun.of is None else f" of {begun.of}"
     item = "" if begun.item is None else f" ({shorten(begun.item, LONG)})"
@@ -33,7 +33,7 @@ def round_text(begun: RoundBegan, of: str = "") -> str:
 
 
 def unmet_text(goal: GoalStory) -> str:
-    """Say what an `expect` saw that its attempt's result does not meet; "" of all else."""
+    """Say which values an unmet `expect` saw in its attempt's result; "" where none did."""
     verdict = goal.verdict
     if verdict is None or not verdict.expect:
         return ""
@@ -69,7 +69,7 @@ def opened(message: Value) -> dict[str, Value]:
 
 
 def named(constants: Constants, field: str, value: int) -> str:
-    """The constant FIELD_X of the message's type that has `value`, as X; else the number."""
+    """Return the constant FIELD_X of the message's type that has `value`, as X; else the number."""
     named = constants.get(field)
     name = named.get(str(value)) if isinstance(named, dict) else None
     return name if isinstance(name, str) else str(value)

@@ -1,7 +1,7 @@
-"""Why a run waits, or has failed: the root cause first, with the values that led to it.
+"""The reason why a run waits, or has failed: the root cause first, with the values behind it.
 
-One function of the state (and of now, while the run goes on), for every place that tells it: the
-terminal, `--json`, RunTree's result, the diagnostics, a failed assertion over a VirtualRunner.
+One function of the state (and of now, while the run goes on) serves every place: the terminal,
+`--json`, RunTree's result, the diagnostics, a failed assertion over a VirtualRunner.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import brief, fit, shorten
 
 LINES = 12
-"""Of one story in a terminal."""
+"""Lines of one story in a terminal."""
 ATTEMPTS = 3
-"""Attempts of one failure that have a line of their own: the last ones."""
+"""Attempts of one failure with a line of their own: the last ones."""
 BELOW = 5
 """Lines of a run below a RunTree leaf."""
 _BELOW = "has failed:"
-"""Ends the line before these."""
+"""The end of the line before these."""
 _FIRST = re.compile(rf"\A(.*)\n  (?:(.*{_BELOW})\n    )?")
-"""The path of a cause; of a RunTree leaf, also what stands before the cause below."""
+"""The path of a cause; for a RunTree leaf, also the text before the cause below."""
 
 _USUAL_ENDS = {
     Outcome.SUCCEEDED: End.SUCCEEDED,
@@ -50,7 +50,7 @@ _USUAL_ENDS = {
 
 
 def why(state: State, now: float | None = None) -> list[str]:
-    """Return why the run waits, or why it has failed; nothing of a run that has succeeded.
+    """Return why the run waits, or why it has failed; [] for a run that has succeeded.
 
     `now` is in seconds on the steady clock, and only counts while the run goes on.
     """
@@ -80,17 +80,17 @@ def why(state: State, now: float | None = None) -> list[str]:
 def why_text(state: State, now: float | None = None) -> str:
     """Return the same as one text, for a reader who may show the first line alone.
 
-    That line has the cause as well as its place in the tree; of a RunTree leaf, the cause below.
+    That line has the cause and its place in the tree; for a RunTree leaf, the cause below.
     """
     text = "\n".join(why(state, now))
     return _FIRST.sub(lambda line: f"{line[1]}: {f'{line[2]} ' if line[2] else ''}", text)
 
 
-# While it runs
+# During the run
 
 
 def waits(state: State, now: float) -> list[str]:
-    """Return for each running leaf, the deepest first, what it does, since and until when."""
+    """Return a line for each running leaf, the deepest first: its work, since and until when."""
     running, lines = state.running, list[str]()
     for each in running[:LINES]:
         name = f"{state.called(each.node.id)}{_items(state.rounds(each.node.id))}"
@@ -103,7 +103,7 @@ def waits(state: State, now: float) -> list[str]:
 
 
 def _told(failure: Failure, state: State) -> Iterator[str]:
-    """Yield when, where and in which item it failed; each attempt; who passed it on."""
+    """Yield time, place and item of a failure, each attempt, and the nodes that passed it on."""
     items = _items(failure.items)
     yield clean(f"{clock(failure.at.wall)}  {' / '.join(failure.path)}{items}")
     if failure.ran is not None:
@@ -123,7 +123,7 @@ def _told(failure: Failure, state: State) -> Iterator[str]:
 
 
 def _raised(state: State, finished: TreeFinished) -> Iterator[str]:
-    """Yield when, where and in which item a node raised something; what; and its place."""
+    """Yield the time, node and item of an error, the error, and its place."""
     when, story = clock(finished.at.wall), state.nodes.get(finished.culprit or 0)
     if story is None:  # no behaviour's fault
         yield clean(f"{when}  {finished.error}")
@@ -159,11 +159,11 @@ def _attempts(failure: Failure) -> Iterator[str]:
 
 
 def attempt_text(action: ActionStory, goal: GoalStory) -> str:
-    """Say of one attempt what was sent, what came back, and what was made of it."""
-    # of an end that nobody will tell any more the run tells at its end
+    """Say of one attempt the goal, the result, and the verdict."""
+    # an end that stays unknown is told at the end of the run
     is_left = goal.latest.state == DONE and goal.latest.end is End.UNKNOWN
     why_not = unmet_text(goal) or ("" if is_left else goal.reason)
-    told = goal.latest.state  # of a run that was left
+    told = goal.latest.state  # the run was left
     if goal.outcome is not None:
         told = outcome_text(goal.outcome, goal.latest.end, goal.in_doubt)
     told += f": {why_not}" if why_not else ""
@@ -178,7 +178,7 @@ def attempt_text(action: ActionStory, goal: GoalStory) -> str:
 
 
 def outcome_text(outcome: Outcome, end: End | None, in_doubt: bool) -> str:
-    """Say what the outcome of a goal is, and how the goal ended where that does not follow."""
+    """Say the outcome of a goal, and its end where that does not follow."""
     if in_doubt:
         return f"{outcome}, not started as far as its server knows"
     if end is None or end is _USUAL_ENDS.get(outcome):
@@ -187,7 +187,7 @@ def outcome_text(outcome: Outcome, end: End | None, in_doubt: bool) -> str:
 
 
 def _dealt_with(state: State) -> Iterator[str]:
-    """Yield the last failures that somebody went on in spite of."""
+    """Yield the last dealt-with failures."""
     groups: dict[object, tuple[Failure, int]] = {}  # rounds of one retry are told once
     for failure in state.dealt_with:
         kept = [each for each in failure.items if each[0] is not failure.by]

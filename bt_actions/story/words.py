@@ -1,4 +1,4 @@
-"""What the views say in words: where a goal stands, what a message holds, how a run ended.
+"""The words of the views: the standing of a goal, the values of a message, the end of a run.
 
 Pure functions of the state; nothing here writes anything.
 """
@@ -23,27 +23,30 @@ from bt_actions.utilities.shorten import MESSAGE, brief, fit, shorten
 from bt_actions.utilities.suggest import listing
 
 NO_END = RunEnded(Moment(0, 0.0, 0.0, 0.0), 0)
-"""In place of the end of a run that has none."""
+"""The stand-in for the end of a run that has none."""
 MOST = 3
-"""Of many actions that are waited for, or many items of a list, how many are shown."""
+"""Actions that are waited for, or items of a list, that a text names."""
 MANY = 20
 """Items of a list that is shown whole."""
 
 
 def begins_text(file: str, inputs: Mapping[str, object]) -> str:
-    """Say that a run begins: its file, and its inputs as they may be told."""
+    """Say that a run begins: its file, and its inputs without secrets."""
     words = fit(", ".join(f"{name}={shorten(value, 60)}" for name, value in inputs.items()), 200)
     return clean(f"begins{f' ({file})' if file else ''}{' with ' if words else ''}{words}")
 
 
 def verdict(status: Status, seconds: float | None) -> str:
-    """Say how a run has ended, and after how long; `seconds` is None for one that never began."""
+    """Say how a run has ended, and after how long; `seconds` is None for a run that never began."""
     word = "STOPPED" if status is Status.INVALID else status.value
     return word if seconds is None else f"{word} after {seconds:.2f} s"
 
 
 def judged(state: State) -> Status:
-    """Return how a run has ended: where a behaviour raised, nobody has stopped it."""
+    """Return the status of an ended run.
+
+    FAILURE where a behaviour raised, though nobody stopped it.
+    """
     raised = state.finished is not None and state.finished.error and state.stop is None
     return Status.FAILURE if raised else state.status
 
@@ -56,7 +59,7 @@ def verdict_on(state: State) -> str:
 
 
 def last_words(state: State, width: int = MESSAGE) -> list[str]:
-    """Return the table, the verdict, how long it took, and last what went wrong."""
+    """Return the table, the verdict, the time, and last the troubles."""
     ended = state.ended or NO_END
     cause = f", {ended.cause}" if ended.cause else ""
     if ended.complaint and state.status is Status.SUCCESS:
@@ -71,7 +74,7 @@ def last_words(state: State, width: int = MESSAGE) -> list[str]:
 
 
 def blocks(*blocks: list[str]) -> list[str]:
-    """Return what stands together, with an empty line before each block."""
+    """Return the lines of all blocks, with an empty line before each."""
     return [line for block in blocks if block for line in ("", *block)]
 
 
@@ -86,18 +89,18 @@ def action_table(state: State, width: int = MESSAGE) -> list[str]:
 
 
 def troubles(state: State) -> list[str]:
-    """Return what went wrong, the gravest last; empty when nothing did."""
+    """Return the troubles of a run, the gravest last; [] without any."""
     warned = [f"{' / '.join(each.path)}: {each.message}" for each in state.warnings]
     warnings = [fit(f"warning: {clean(line)}") for line in warned]
     return [*warnings, *why(state), *left_open(state)]
 
 
 def left_open(state: State) -> list[str]:
-    """Return what went wrong beside the tree, and what is not known, the gravest last."""
+    """Return the troubles beside the tree, and the unknowns, the gravest last."""
     ended = state.ended or NO_END
     lines = [line for line in (ended.complaint, error_text(state)) if line]
     left = {each.server for each in state.actions if each.left_at_server or each.live}
-    if left and not state.simulation:  # which ended with the run's process
+    if left and not state.simulation:  # simulated servers ended with the run's process
         which = " ".join(["", *sorted(left)]) if len(left) <= MOST else ""
         lines.append(
             "A goal may still run, or run on where its server only stood still: once that is in "
@@ -108,19 +111,19 @@ def left_open(state: State) -> list[str]:
 
 
 def error_text(state: State) -> str:
-    """Say what of the run no failure of its tree says, nor what a behaviour raised."""
+    """Say what is wrong with the run beside failures of its tree and errors of behaviours."""
     if state.finished is not None and (state.finished.error or state.failures):
         return ""
     return state.ended.error if state.ended is not None else ""
 
 
 def goal_text(action: ActionStory) -> str:
-    """Say where the latest goal of an action stands."""
+    """Say how the latest goal of an action stands."""
     if action.outcome is None:
         return str(goal_doing(action.state, action.server, action.attempt, action.of))
     attempt = f" (attempt {action.attempt})" if action.attempt > 1 else ""
     text = outcome_text(action.outcome, action.end, action.in_doubt)
-    if action.end is End.UNKNOWN:  # why, is told of the goal
+    if action.end is End.UNKNOWN:  # the goal's own line says why
         return f"{text}{' yet' if action.live else ''}{attempt}"
     if action.outcome is Outcome.SUCCEEDED or action.latest is None:
         return f"{text}{attempt}"
@@ -129,7 +132,7 @@ def goal_text(action: ActionStory) -> str:
 
 
 def stopping_text(state: State) -> str:
-    """Say that the run is asked to end, and what is waited for."""
+    """Say that the run is asked to end, and the goals that it waits for."""
     assert state.stop is not None
     again = "Ctrl-C again leaves without waiting"
     live = len(state.live)
@@ -141,7 +144,7 @@ def stopping_text(state: State) -> str:
 
 
 def waiting_text(state: State) -> str:
-    """Say for what a run waits whose tree has ended; "" where it is over."""
+    """Say what a run waits for whose tree has ended; "" when it is over."""
     actions = [action for action in state.actions if action.waited_for]
     if actions:
         goals = sum(action.waited_for for action in actions)
@@ -161,7 +164,7 @@ def _where(state: State, actions: list[ActionStory]) -> str:
 
 
 def result_lines(action: ActionStory) -> list[str]:
-    """Return the result of an action as lines of YAML; of long values the beginning."""
+    """Return the result of an action as lines of YAML, with the beginnings of long values."""
     result = action.latest.result if action.latest is not None else None
     if result is None:
         return []
