@@ -1,4 +1,4 @@
-"""What happens in a run, as one stream of values that feeds terminal, log, recorder and page."""
+"""The events of a run, as one stream of values that feeds terminal, log, recorder and page."""
 
 from bt_actions.events.kinds import (
     AttemptEnded,

@@ -1,8 +1,9 @@
-"""Events without the values that a robot moved by: for those who may know the story alone.
+"""Events without the values that a robot moved by: for readers who may know the story alone.
 
 What stays is which node did what, when, and with which outcome. Goals, results, feedback,
-variables, items, inputs and outputs go, and of each text what may hold values: see `said`. Of what
-nodes say only the outcomes of actions stay, by their names: a leaf of the user's may say anything.
+variables, items, inputs and outputs go, and of each text the part that may hold values: see `said`.
+Of nodes' messages only the outcomes of actions stay, by their names: a user's leaf may say
+anything.
 """
 
 from __future__ import annotations
@@ -34,12 +35,12 @@ _OUTCOMES = frozenset(each.value for each in Outcome)
 _OF_THE_LEAF = (Outcome.UNEXPECTED_RESULT, Outcome.INVALID_GOAL)
 """Outcomes whose reason the leaf's own expressions give: it may begin with a value."""
 _VALUE = re.compile(r"\{|: |; ")
-"""What may stand before a value: an action's `explain` follows a semicolon."""
+"""The beginnings of a value in a text: an action's `explain` follows a semicolon."""
 _RAISED = re.compile(r".*?: (?:tick|setup) raised \w+")
 _SETTINGS = ("timeouts", "attempts", "memory", "constants")
-"""Of a node: those that are no values of the robot's."""
+"""Settings of a node that are no values of the robot's."""
 _WHERE = ("node", "domain", "simulation")
-"""Of a run: where it is, but for the name of the computer."""
+"""The place of a run, but for the name of the computer."""
 
 
 def bare(event: Event) -> Event | None:
@@ -49,23 +50,26 @@ def bare(event: Event) -> Event | None:
 
 
 def said(text: str) -> str:
-    """Return a text up to its first value; all that a server or a user's node says is value."""
+    """Return a text up to its first value.
+
+    Every word of a server or a user's node counts as value.
+    """
     return _VALUE.split(text, 1)[0].rstrip(" ;,:")
 
 
 def outcome_of(message: str) -> str:
-    """Return of a node's message the outcome of an action, which stands first: else ""."""
+    """Return the outcome of an action that begins a node's message, or ""."""
     head = re.split(r"[ :]", message, maxsplit=1)[0]
     return head if head in _OUTCOMES else ""
 
 
 def reason_of(outcome: Outcome | None, reason: str) -> str:
-    """Return what may be known of why a goal has this outcome."""
+    """Return the part without values of a goal's reason for this outcome."""
     return "" if outcome in _OF_THE_LEAF else said(reason)
 
 
 def bare_node(node: Node) -> Node:
-    """Return a node with those of its policies alone that are no values, and in no folder."""
+    """Return a node without folders, and with those policies alone that are no values."""
     kept = {name: each for name, each in node.settings.items() if name in _SETTINGS}
     return replace(node, settings=kept, place=node.place.rpartition("/")[2])
 
@@ -86,7 +90,7 @@ def _finished(event: TreeFinished) -> TreeFinished:
 
 
 def _raised(text: str) -> str:
-    """Return of what a node raised the type alone."""
+    """Return the type of an error alone."""
     found = _RAISED.match(text)
     return found[0] if found else said(text)
 

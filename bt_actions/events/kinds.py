@@ -1,4 +1,4 @@
-"""What happens in a run, as frozen values of plain data: nothing here refers to a live object.
+"""The events of a run, as frozen values of plain data: nothing here refers to a live object.
 
 Every event begins with its `Moment`. A node of the tree is named by its number in `RunBegan`.
 Values of goals, results, feedback and variables are snapshots (snapshot.py); wire.py has their
@@ -18,20 +18,20 @@ from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.unaccounted import GoalReport
 
 LEFT_OUT = "left out"
-"""Begins the message of a node that has ended and was left out, whatever its status."""
+"""The beginning of the message of an ended node that was left out, whatever its status."""
 
 
 def says_left_out(status: Status, message: str) -> bool:
-    """Whether a node of this status and message was left out."""
+    """Return whether a node of this status and message was left out."""
     is_over = status in (Status.SUCCESS, Status.FAILURE)
     return is_over and (message == LEFT_OUT or message.startswith(f"{LEFT_OUT}: "))
 
 
 class Moment(NamedTuple):
-    """When something happened, and its place in the order of all events of a runner."""
+    """The time of an event, and its place in the order of all events of a runner."""
 
     number: int
-    """From 1, without a gap; by number the steady clock never goes back."""
+    """The number from 1, without a gap; by number the steady clock never goes back."""
     steady: float
     """Seconds on the steady clock."""
     wall: float
@@ -45,11 +45,11 @@ class Node:
     """One node of a tree, as it was when the run began or the node was inserted."""
 
     id: int
-    """From 1, parents first."""
+    """The number from 1, parents first."""
     parent: int | None
     name: str
     kind: str
-    """In the words of the YAML language where it has one, else the name of the class."""
+    """The word of the YAML language where it has one, else the name of the class."""
     place: str = ""
     """``file:line:column`` in a tree file; "" for a node made in Python."""
     server: str = ""
@@ -61,12 +61,12 @@ class Node:
     `only_if`, `only_while`,
     `constants` by message (``{"feedback": {"status": {"2": "MOVING"}}}``)."""
     index: int | None = None
-    """Of a node that was inserted: its place among its siblings, from 0."""
+    """The place of an inserted node among its siblings, from 0."""
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What all kinds have in common."""
+    """The common part of all kinds."""
 
     at: Moment
 
@@ -83,15 +83,14 @@ class RunBegan(Event):
     sources: Mapping[str, str]
     """The tree files by path, as they were read."""
     versions: Mapping[str, str]
-    """Of bt_actions, py_trees, rclpy and Python."""
+    """The versions of bt_actions, py_trees, rclpy and Python."""
     request: str = ""
     """The UUID of the RunTree goal that the run answers, in hexadecimal; or ""."""
     caller: str = ""
     """The `run_id` of the run whose leaf sent that goal, where it is known."""
     where: Mapping[str, str] = field(default_factory=dict)
-    """`node` (its full name), `domain` and `host`; of a run in a simulation also `simulation`: the
-    options that say what stood in for the world (``--sim --speed 10 --fault move_robot:1:abort``).
-    """
+    """`node` (its full name), `domain` and `host`; for a run in a simulation also `simulation`:
+    the options for the stand-in of the world (``--sim --speed 10 --fault move_robot:1:abort``)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +102,7 @@ class NodesAdded(Event):
 
 @dataclass(frozen=True, slots=True)
 class NodesRemoved(Event):
-    """Nodes are in the tree no more."""
+    """Nodes are out of the tree."""
 
     nodes: tuple[int, ...]
 
@@ -116,11 +115,11 @@ class NodeChanged(Event):
     status: Status
     message: str
     by_itself: bool = False
-    """Of a FAILURE: no failure below the node has caused it."""
+    """For a FAILURE: whether no failure below the node has caused it."""
     warning: str = ""
-    """Of a SUCCESS: why that may not be what was meant."""
+    """For a SUCCESS: why that may not be meant."""
     due_in: float | None = None
-    """Of RUNNING: seconds until the node's own time runs out, where it has one."""
+    """For RUNNING: seconds until the node's own time runs out, where it has one."""
 
     @property
     def is_left_out(self) -> bool:
@@ -130,15 +129,16 @@ class NodeChanged(Event):
 
 @dataclass(frozen=True, slots=True)
 class TickLasts(Event):
-    """The tick of a node itself has not returned for long; or, as `is_over` says, it now has.
+    """The tick of a node itself has not returned for long; or, with `is_over`, has now.
 
-    All of the tree waits for it. Told from a thread of its own, once for each such tick.
+    All of the tree waits for that tick. The event comes from another thread, once for each such
+    tick.
     """
 
     node: int
     """The innermost node in whose tick the tree is; its status may be told yet."""
     seconds: float
-    """For how long, by now."""
+    """The seconds of the tick by now."""
     is_over: bool = False
 
 
@@ -173,9 +173,9 @@ class AttemptEnded(Event):
     expect: str = ""
     """The condition that the result does not meet, as it was written; or ""."""
     seen: Mapping[str, Value] = field(default_factory=dict)
-    """What stood for each name and field in that condition: ``{"result.stalled": False}``."""
+    """The value of each name and field in that condition: ``{"result.stalled": False}``."""
     again_in: float | None = None
-    """Seconds until the next attempt; None where there is none."""
+    """Seconds until the next attempt; None without one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,8 +192,8 @@ class VariableWritten(Event):
     """A variable has another value: at most five a second, the last before a failure always."""
 
     name: str
-    """As the tree has it; behind the name and number of the subtree that has it (``recover_1/x``).
-    Of a variable of the user's own, the blackboard's key."""
+    """The name in the tree, behind name and number of its subtree (``recover_1/x``); for a
+    variable of the user's own, the blackboard's key."""
     value: Value
     node: int | None
     """The node in whose tick it was written, where that is known."""
@@ -205,9 +205,9 @@ class RoundBegan(Event):
 
     node: int
     number: int
-    """From 0."""
+    """The number from 0."""
     of: int | None
-    """How many there are at most; None without a limit."""
+    """The number of rounds at most; None without a limit."""
     item: Value = None
     """The item of a `for_each`."""
 
@@ -235,26 +235,26 @@ class ClockJumped(Event):
     """The wall clock was set, or the ROS clock went back."""
 
     clock: str
-    """wall or ros."""
+    """The clock: wall or ros."""
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
 class Paused(Event):
-    """No new goal is begun from now on (`paused`), or the run goes on."""
+    """The run is paused, and begins no new goal; or it goes on."""
 
     paused: bool
 
 
 @dataclass(frozen=True, slots=True)
 class StopWanted(Event):
-    """Somebody asks the run to end: its goals are canceled and drained."""
+    """A request to end the run: its goals are canceled and drained."""
 
     who: str
-    """SIGINT and the like, TIMEOUT, SIGPIPE, INTERRUPTED (by a program); of a served run CANCELED,
-    HALTED, ..."""
+    """The author: SIGINT and the like, TIMEOUT, SIGPIPE, INTERRUPTED (by a program); for a
+    served run CANCELED, HALTED, ..."""
     why: str
-    """In words, to follow the status: ``interrupted by SIGINT``."""
+    """The reason, to follow the status: ``interrupted by SIGINT``."""
     abandons: bool = False
     """Whether goals that are being drained are waited for no longer."""
 
@@ -265,9 +265,9 @@ class TreeFinished(Event):
 
     status: Status
     outputs: Mapping[str, Value] = field(default_factory=dict)
-    """Of a success, whole: they are data for the caller."""
+    """The outputs of a success, whole: they are data for the caller."""
     error: str = ""
-    """What a behaviour raised, with its place; or ""."""
+    """The error of a behaviour, with its place; or ""."""
     unusable: bool = False
     """Whether the tree cannot be set up as it is given, whatever the world does."""
     unaccounted: tuple[GoalReport, ...] = ()
@@ -281,15 +281,15 @@ class RunEnded(Event):
 
     exit_code: int
     cause: str = ""
-    """Why it did not end by itself, or ""."""
+    """The reason why the run did not end by itself, or ""."""
     error: str = ""
-    """Why the caller's wish could not be met at all, or ""."""
+    """The reason why the caller's wish could not be met at all, or ""."""
     unaccounted: tuple[str, ...] = ()
-    """A line for each goal whose end is not known; also of those that were left."""
+    """A line for each goal whose end is not known, left ones included."""
     world: str = ""
-    """What the simulated world looks like, or ""."""
+    """The state of the simulated world, or ""."""
     complaint: str = ""
-    """What is not as it was expected of that world, or ""."""
+    """A difference of that world from what was expected, or ""."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,5 +300,5 @@ class EventsLost(Event):
 
 
 Observer: TypeAlias = Callable[[Event], None]
-"""Called on the ticking thread with each event, in their order; one that raises is removed, and the
-run goes on."""
+"""Called on the ticking thread with each event, in their order; an observer that raises is
+removed, and the run goes on."""

@@ -1,7 +1,7 @@
-"""Any value as plain data that nobody can change, taken in bounded time.
+"""Any value as plain data that cannot change, taken in bounded time.
 
-A snapshot holds texts, numbers, bytes, None, tuples, and dictionaries by text; what exceeds the
-bounds is counted in a `Cut`, and not looked at. A ROS message is recognised by what it can do.
+A snapshot holds texts, numbers, bytes, None, tuples, and dictionaries by text; parts beyond the
+bounds are counted in a `Cut`, and not looked at. A ROS message is recognised by its methods.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ else:
     Value = object  # wire.py asks for the hints of events
 
 HIDDEN = "•••"
-"""In place of a value that is secret, or was computed from one."""
+"""The stand-in for a secret value, or one computed from a secret."""
 FIELDS = 1000
-"""Values in one snapshot, those that hold others included,"""
+"""Values in one snapshot, containers included,"""
 SIZE = 64_000
-"""and their size: the characters of a text, the bytes of bytes, 8 for anything else."""
+"""and their size: the characters of a text, the bytes of bytes, 8 for any other value."""
 WIDE = 64
-"""Bytes of a whole number; a greater one is a text of its size."""
+"""Bytes of a whole number; a greater one becomes a text with its size."""
 DEEP = 30
 """Levels; a value that holds itself ends there."""
 
@@ -43,7 +43,7 @@ class Cut:
 
 
 def snapshot(value: object, *, fields: int = FIELDS, size: int = SIZE) -> Value:
-    """Return `value` as it is now. Raises nothing, whatever the value's own methods do."""
+    """Return `value` as it is now; raise nothing, whatever the value's own methods do."""
     return _Snapshot(fields, size).of(value, 0)
 
 
@@ -66,7 +66,7 @@ class _Snapshot:
     def _of(self, value: Any, depth: int) -> Value:
         if isinstance(value, str):
             return self._text(str(value))
-        if isinstance(value, bytes | bytearray) and len(value) != 1:  # one is a byte of ROS
+        if isinstance(value, bytes | bytearray) and len(value) != 1:  # a lone one is a byte of ROS
             return self._text(bytes(value))
         if depth >= DEEP:
             return Cut((), 1)
@@ -93,7 +93,7 @@ class _Snapshot:
         count, room = len(items), max(0, min(self._fields, self._size // 8))
         first: Any = items[:room] if hasattr(items, "__getitem__") else items
         taken: Any = plain(first) if hasattr(first, "tolist") else first
-        if type(first) is array:  # of numbers of the machine
+        if type(first) is array:  # numbers of the machine
             self._fields -= len(taken)
             self._size -= 8 * len(taken)
             return tuple(taken) if len(taken) == count else Cut(tuple(taken), count - len(taken))
@@ -120,23 +120,26 @@ class _Snapshot:
 
 @lru_cache(maxsize=256)
 def _fields_of(kind: Any) -> Mapping[str, str] | None:
-    """The fields of a message type with their types as rosidl names them; None of another type."""
+    """Return the fields of a message type with their types in rosidl's words.
+
+    None for another type.
+    """
     asked = getattr(kind, "get_fields_and_field_types", None)
     return None if asked is None else asked()
 
 
 def _bounded(value: bool | int | float | None) -> Value:
-    """A number, or how large it is."""
+    """Return a number, or its size."""
     if isinstance(value, int) and value.bit_length() > 8 * WIDE:
         return f"<a number of {value.bit_length()} bits>"
     return value
 
 
 def _byte(item: object) -> object:
-    """A byte of ROS as its number."""
+    """Return a byte of ROS as its number."""
     return item[0] if isinstance(item, bytes) and len(item) == 1 else item
 
 
 def _own(number: Any) -> int | float:
-    """Python's own number for one of a subclass."""
+    """Return Python's own number for one of a subclass."""
     return int(number) if isinstance(number, int) else float(number)

@@ -1,10 +1,10 @@
-"""The events of one runner in one order, and those who read them.
+"""The events of one runner in one order, and their readers.
 
 An event gets its moment and its place in the order together, under the stream's lock, on the thread
-on which it happens: the receiving thread for what a server says, the ticking thread for a node
+on which it happens: the receiving thread for a word of a server, the ticking thread for a node
 whose tick returns. That thread notes the event's fields, and no more: the first reader that takes
-makes the events of them, for all readers. Each reader has a queue of its own, so none waits for
-another, and no producer waits for any. Where nobody reads, nothing is noted.
+makes the events of the notes, for all readers. Each reader has a queue of its own, so no reader
+waits for another, and no producer waits for any. Without a reader, nothing is noted.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from bt_actions.events.kinds import (
 )
 
 ROOM = 20_000
-"""Events that wait for one reader, before what can be spared is left out for it."""
+"""Events that wait for one reader, before spared kinds are left out for it."""
 SPARED = (FeedbackCame, VariableWritten, NodeChanged, RoundBegan, Logged)
-"""Kinds that are left out for a slow reader; goals and the run itself never are."""
+"""Kinds that are left out for a slow reader; events of goals and of the run never are."""
 CHANGES = 100
-"""Times that nodes come or go before what a late reader is told of them is put into one event."""
+"""Times that nodes come or go before a late reader gets the changes as one event."""
 JUMP = 0.5
-"""Seconds by which a clock has to differ from the steady one at once to have jumped."""
+"""Seconds by which a clock must differ from the steady one at once to have jumped."""
 SLEW = 0.001
-"""How much faster or slower the wall clock may run without having jumped, as NTP lets it."""
+"""The share by which the wall clock may run faster or slower without a jump, as NTP lets it."""
 Clock = Callable[[], tuple[float, float, float]]
 """The steady, the wall and the ROS clock, in seconds."""
 _Note: TypeAlias = tuple[
@@ -62,7 +62,10 @@ class Reader:
         self._lost = 0
 
     def take(self) -> list[Event]:
-        """Return what has come since the last call, in order; EventsLost for what was left out."""
+        """Return the events since the last call, in order.
+
+        EventsLost for those that were left out.
+        """
         self._make()
         events = []
         while self._events:
@@ -81,39 +84,39 @@ class Reader:
 
 
 def _is_spared(event: Event) -> bool:
-    """Whether a slow reader has to do without an event: never without a failure."""
+    """Return whether to leave an event out for a slow reader; one with a failure never is."""
     failed = isinstance(event, NodeChanged) and event.status is Status.FAILURE
     return isinstance(event, SPARED) and not failed
 
 
 class Stream:
-    """Takes events from any thread."""
+    """The stream, which takes events from any thread."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._lock = threading.Lock()
-        """Of what is noted."""
+        """The lock on the notes."""
         self._making = threading.Lock()
-        """Of what is made of it; whoever wants both takes this one first."""
+        """The lock on the making of events; a holder of both takes this one first."""
         self._noted: deque[_Note] = deque()
         self._readers: tuple[Reader, ...] = ()
         self._number = 0
         self._nodes: tuple[RunBegan | NodesAdded | NodesRemoved, ...] = ()
-        """The RunBegan of the run that was told of last, and the nodes that came and went since."""
+        """RunBegan of the latest run, and the nodes that came and went since."""
         self._last: tuple[float, float, float] | None = None
         self.stop_is_told = False
-        """Whether it was told who asks the run to end; the run takes it back at its end."""
+        """Whether StopWanted was told; the run resets it at its end."""
 
     @property
     def is_read(self) -> bool:
-        """Whether anybody reads: else nothing has to be added."""
+        """Whether the stream has a reader: without one, nothing need be added."""
         return bool(self._readers)
 
     def reader(self, poke: Callable[[], None] = lambda: None, room: int = ROOM) -> Reader:
-        """Return a reader of all events from now on, behind those that tell of the tree's nodes.
+        """Return a reader of all events from now on, behind those that tell the tree's nodes.
 
-        `poke` is called, on the thread of an event and under the lock, where one comes and all
-        before it were taken; it must not wait, and a reader whose `poke` raises is let go of.
+        `poke` is called, on the thread of an event and under the lock, where an event comes and all
+        before it were taken. `poke` must not wait, and a reader whose `poke` raises is removed.
         """
         reader = Reader(self._make, poke, room)
         with self._making, self._lock:
@@ -124,15 +127,15 @@ class Stream:
         return reader
 
     def leave(self, reader: Reader) -> None:
-        """Let go of a reader."""
+        """Remove a reader."""
         with self._making, self._lock:
             self._make_noted()
             self._readers = tuple(each for each in self._readers if each is not reader)
 
     def add(self, kind: Callable[..., Event], *args: Any, **fields: Any) -> None:
-        """Note an event of `kind`, of what follows its moment, for all readers.
+        """Note an event of `kind`, with the fields that follow its moment, for all readers.
 
-        What is given is not looked at until somebody reads: nobody may change it.
+        The fields are not looked at until a reader takes, so they must not change.
         """
         if not self._readers:
             return
@@ -142,7 +145,7 @@ class Stream:
             self._noted.append((kind, self._clock(), args, fields))
             if len(self._noted) == 1:
                 self._poke()
-        if len(self._noted) >= ROOM:  # nobody takes: the readers' queues know what can be spared
+        if len(self._noted) >= ROOM:  # no reader takes: their queues know what to spare
             self._make()
 
     def now(self) -> tuple[float, float, float]:
@@ -154,7 +157,7 @@ class Stream:
         for reader in self._readers:
             try:
                 reader.poke()
-            except Exception:  # noqa: BLE001 - any; nobody else must suffer from it
+            except Exception:  # noqa: BLE001 - any; no other reader must suffer from it
                 self._readers = tuple(each for each in self._readers if each is not reader)
 
     def _make(self) -> None:
@@ -183,7 +186,7 @@ class Stream:
             reader.put(event)
 
     def _jumps(self, now: tuple[float, float, float]) -> list[tuple[str, float]]:
-        """Which clocks have jumped since the last event, and by how much."""
+        """Return the clocks that have jumped since the last event, and by how much."""
         last, self._last = self._last, now
         if last is None:
             return []
@@ -199,7 +202,7 @@ class Stream:
 def _nodes_after(events: Iterable[RunBegan | NodesAdded | NodesRemoved]) -> tuple[Node, ...]:
     """Return the nodes that are there in the end, by number, each with its index.
 
-    The index is a node's among those siblings that stand before it in what is returned.
+    The index is a node's place among those siblings that come before it in the result.
     """
     nodes, below = dict[int, Node](), defaultdict[int | None, list[int]](list)
     for event in events:

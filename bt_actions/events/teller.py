@@ -1,7 +1,7 @@
-"""Tells the stream of one runner what its nodes do: who they are by number, what they write.
+"""The teller of one runner: the numbers of its nodes, and their events and writes, to the stream.
 
 `current_teller` is that of the run that ticks on this thread. A node of the tree tells it, and
-needs to know nothing of runs or readers.
+needs no knowledge of runs or readers.
 """
 
 from __future__ import annotations
@@ -16,46 +16,46 @@ from bt_actions.events.snapshot import HIDDEN, Value, snapshot
 from bt_actions.events.stream import Stream
 
 _OF_LOAD = re.compile(r"^/bt/\w+/\d+/")
-"""What the blackboard's key of a tree's variable begins with, another at each load."""
+"""The beginning of the blackboard's key of a tree's variable, which each load has anew."""
 OFTEN = 0.2
 """Seconds between two events of one goal's feedback, and of one variable."""
 
 
 class Named(Protocol):
-    """A node: whatever is hashable by identity."""
+    """A node: any object that is hashable by identity."""
 
     name: str
 
 
 class Teller:
-    """What a runner tells of its tree."""
+    """The events of a runner's tree, from nodes to the stream."""
 
     def __init__(self, stream: Stream, steady: Callable[[], float]) -> None:
-        """`steady` gives the seconds by which the rates of events are bounded."""
+        """Make a teller; `steady` gives the seconds by which the rates of events are bounded."""
         self.stream = stream
         self.run_id = ""
-        """32 hexadecimal digits, another one in each run."""
+        """32 hexadecimal digits, new in each run."""
         self.reads_secret = False
-        """Whether a secret was read since a node was last known to have done something: what is
-        written, said or sent since then is told as hidden."""
+        """Whether a secret was read since the last claim of a node: later values are told as
+        hidden."""
         self.numbers: dict[object, int] = {}
-        """The number of each node, which all threads may look up."""
+        """The number of each node, for look-ups on all threads."""
         self._steady = steady
         self._written: dict[str, Value] = {}
-        """Since a node was last known to have written."""
+        """Values written since the last claim."""
         self._waiting: dict[str, tuple[Value, int | None]] = {}
         """Values that came too soon after the one before."""
         self._told: dict[str, tuple[float, Value]] = {}
 
     @property
     def is_heard(self) -> bool:
-        """Whether anybody reads what is told."""
+        """Whether the stream has a reader."""
         return self.stream.is_read
 
     def tell(self, kind: Callable[..., Event], node: object, *args: Any, **fields: Any) -> None:
-        """Tell an event of a node, if that is one of the tree."""
+        """Tell an event of a node, if the node is one of the tree."""
         if not self.numbers and self.is_heard:
-            self.began()  # the first reader has come since
+            self.began()  # the first reader has come since then
         number = self.numbers.get(node)
         if number is not None:
             self.stream.add(kind, number, *args, **fields)
@@ -66,12 +66,12 @@ class Teller:
     # Variables; on the ticking thread
 
     def wrote(self, key: str, value: object) -> None:
-        """Take note of what a variable holds from now on; `claim` says who wrote it."""
+        """Take note of a variable's new value; `claim` names the writer."""
         if self.stream.is_read:
             self._written[_OF_LOAD.sub("", key)] = self.shown(value)
 
     def shown(self, value: object) -> Value:
-        """Return a snapshot of what a node has just computed, if that may be told."""
+        """Return a snapshot of a value that a node has just computed, or HIDDEN."""
         return HIDDEN if self.reads_secret else snapshot(value)
 
     @property
@@ -93,7 +93,7 @@ class Teller:
                 self._tell_of(key, now)
 
     def all_written(self) -> None:
-        """Tell what waits for its time: something fails, or the run ends."""
+        """Tell the waiting values: a node fails, or the run ends."""
         for key in list(self._waiting):
             self._tell_of(key, self._steady())
 

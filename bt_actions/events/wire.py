@@ -1,9 +1,9 @@
 """Events as JSON and back, exactly: an event that was read equals the one that was written.
 
-What JSON cannot say stands in an object with one key that begins with a dollar sign: ``{"$float":
-"nan"}``, ``{"$int": "9223372036854775807"}`` beyond what a float holds, ``{"$bytes": "..."}`` in
-base64, ``{"$cut": [head, more]}``, and ``{"$map": [[key, value], ...]}`` for a dictionary with such
-a key of its own.
+A value that JSON lacks stands in an object with one key that begins with a dollar sign:
+``{"$float": "nan"}``, ``{"$int": "9223372036854775807"}`` beyond what a float holds, ``{"$bytes":
+"..."}`` in base64, ``{"$cut": [head, more]}``, and ``{"$map": [[key, value], ...]}`` for a
+dictionary with such a key of its own.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _LATEST = 1e11
 """Seconds of any clock, at most: a date of it can be written, and a difference taken."""
 _JSON = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
 _EXACT = 2**53
-"""Up to which every reader of JSON has whole numbers exactly."""
+"""The limit up to which every reader of JSON has whole numbers exactly."""
 _MOST = 2**63
 """Numbers that count something: beyond 4,300 digits Python writes none."""
 KINDS: dict[str, type[Event]] = {
@@ -39,7 +39,7 @@ KINDS: dict[str, type[Event]] = {
 
 
 class WireError(ValueError):
-    """A line is no event."""
+    """A line that is no event."""
 
 
 def to_line(event: Event) -> str:
@@ -56,7 +56,7 @@ def from_line(line: str | bytes) -> Event:
 
 
 def to_plain(event: Event) -> dict[str, Any]:
-    """Return an event as data that JSON can say; `kind` is its name."""
+    """Return an event as data for JSON; `kind` is its name."""
     return {"kind": type(event).__name__, **_fields_of(event)}
 
 
@@ -79,7 +79,7 @@ def from_plain(data: object) -> Event:
 
 
 def packed(value: Any) -> Any:
-    """Return what an event holds as data that JSON can say."""
+    """Return a value of an event as data for JSON."""
     kind = type(value)
     if value is None or kind is str or kind is bool:
         return value
@@ -107,7 +107,7 @@ def _fields_of(held: Any) -> dict[str, Any]:
 
 
 def _value(data: Any) -> Any:
-    """The snapshot that was packed."""
+    """Return the snapshot that was packed."""
     if isinstance(data, list):
         return tuple(_value(item) for item in data)
     if not isinstance(data, dict):
@@ -133,12 +133,12 @@ Reader = Callable[[Any], Any]
 
 @lru_cache(maxsize=64)
 def _readers(kind: Any) -> dict[str, Reader]:
-    """How each field of a kind is read."""
+    """Return the reader of each field of a kind."""
     return {name: reader_of(hint) for name, hint in typing.get_type_hints(kind).items()}
 
 
 def reader_of(hint: Any) -> Reader:
-    """Return what reads such data back as a value of this type."""
+    """Return the function that reads such data back as a value of this type."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if origin in (typing.Union, types.UnionType) and type(None) in inner and len(inner) == 2:
         read = reader_of(next(each for each in inner if each is not type(None)))
