@@ -1,9 +1,9 @@
 """Two runs of a tree, compared: where they part first.
 
-Of each node the outcomes are compared in their order: of its visits, attempts and rounds. So
-branches of a parallel may interleave in one way or another. Times, ids and feedback do not count,
-nor how often a node came to the same end in a row: a condition is asked in each tick. A value that
-was not kept is like any other.
+The outcomes of each node are compared in their order: of its visits, attempts and rounds. So
+branches of a parallel may interleave in any way. Times, ids and feedback do not count, and neither
+does the number of equal outcomes of a node in a row: a condition is asked in each tick. A value
+that was not kept equals any other.
 """
 
 from __future__ import annotations
@@ -46,26 +46,29 @@ class Step(NamedTuple):
     """One outcome in a run."""
 
     number: int
-    """Of its event."""
+    """The number of its event."""
     seconds: float
-    """Since the run began."""
+    """Seconds since the run began."""
     place: int
     value: Value
-    """What is compared."""
+    """The value for the comparison."""
     text: str
-    """The same in words, with what belongs to it."""
+    """The same in words, with its details."""
 
 
 class Places:
-    """Gives a number to each place in a tree, the same in each run: by names, not by numbers."""
+    """The numbers of places in a tree, the same in each run.
+
+    By names, not by the nodes' numbers.
+    """
 
     def __init__(self) -> None:
         self._numbers: dict[tuple[int, str], int] = {}
         self._held = [(0, "")]
-        """What holds each place, and its name."""
+        """The holder of each place, and its name."""
 
     def of(self, state: State) -> dict[int, int]:
-        """Return the place of each node; of siblings with one name, the later ones are counted."""
+        """Return the place of each node; later siblings of one name are counted."""
         places, seen = dict[int, int](), Counter[tuple[int, str]]()
         for key, story in state.nodes.items():
             held = places.get(story.node.parent or 0, 0), story.node.name
@@ -91,12 +94,12 @@ class Walk:
     """The outcomes of a run, in their order."""
 
     def __init__(self, items: Iterable[Item], places: Places) -> None:
-        """Read them all. Raises RecordingError."""
+        """Read all outcomes. Raises RecordingError."""
         self.state = State()
-        """How the run stands at the end of what is recorded."""
+        """The state of the run at the end of its recording."""
         self.steps: list[Step] = []
         self.lost = 0
-        """Events that are not in the recording."""
+        """Events that are missing in the recording."""
         self._place: dict[int, int] = {}
         self._last: dict[int, Value] = {}
         """The latest outcome by place."""
@@ -144,7 +147,7 @@ class Walk:
         text, result = str(event.outcome), None
         if goal is not None:
             text = attempt_text(action, goal)
-            result = goal.result if goal.latest.end is not End.CANCELED else None  # is of its time
+            result = goal.result if goal.latest.end is not End.CANCELED else None  # else it varies
             if goal.outcome is Outcome.SUCCEEDED and result is not None:
                 text += f"; result {shorten(opened(result))}"
         value = ("ends", event.attempt, str(event.outcome), result)
@@ -166,11 +169,11 @@ class Parting:
     """The earliest difference of two runs."""
 
     path: tuple[str, ...]
-    """Of the node."""
+    """The path of the node."""
     sides: tuple[Step | None, Step | None]
-    """What either run did there; None for a run that did nothing more there."""
+    """The outcome of either run there; None for a run with no further outcome there."""
     common: int
-    """Outcomes before it, which are the same."""
+    """Equal outcomes before it."""
     last: Step | None
     """The last of these."""
 
@@ -178,7 +181,7 @@ class Parting:
 def parting(walks: tuple[Walk, Walk], places: Places, tolerance: float) -> Parting | None:
     """Return where two runs part, or None; numbers differ by more than `tolerance`.
 
-    That is both an absolute difference and one relative to the greater number.
+    `tolerance` is both an absolute difference and one relative to the greater number.
     """
     by_place = tuple(_by_place(walk) for walk in walks)
     found: list[tuple[float, int, int, Step | None, Step | None]] = []
@@ -210,7 +213,7 @@ def _by_place(walk: Walk) -> defaultdict[int, list[Step]]:
 
 
 def alike(a: Value, b: Value, tolerance: float) -> bool:
-    """Whether two values are the same as far as is known, but for small differences of numbers."""
+    """Return whether two values are equal, as far as is known, within the tolerance."""
     waiting = [(a, b)]
     while waiting:
         a, b = waiting.pop()

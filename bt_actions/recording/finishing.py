@@ -1,7 +1,9 @@
-"""Finishes the files of a run that is over: packed in chunks, with an index, as other readers want.
+"""The finish of the files of a run that is over.
 
-Run as a process of its own (``python -m bt_actions.recording.finishing FILES``) at low priority, or
-on a thread of a process that ticks no tree.
+Packed in chunks, with an index, for other readers.
+
+The finish runs as a process of its own (``python -m bt_actions.recording.finishing FILES``) at low
+priority, or on a thread of a process that ticks no tree.
 """
 
 from __future__ import annotations
@@ -35,13 +37,13 @@ AT_ONCE = 1_000_000
 """Bytes that take less than 0.3 s to finish."""
 _FOOTER = 2
 _END = 9 + 20 + len(MAGIC)
-"""Bytes of the footer and what follows it."""
+"""Bytes of the footer and the magic behind it."""
 _CHUNK = 256_000
 _NICE = 10
 
 
 def is_finished(part: Path) -> bool:
-    """Whether a file ends as MCAP does. Raises OSError."""
+    """Return whether a file ends as MCAP does. Raises OSError."""
     with part.open("rb") as file:
         if file.seek(0, os.SEEK_END) < _END:
             return False
@@ -51,23 +53,21 @@ def is_finished(part: Path) -> bool:
 
 
 def finish(first: Path) -> bool:
-    """Finish the files of a run unless somebody writes them; return whether they are finished.
+    """Finish the files of a run unless a process writes them; return whether they are finished.
 
-    Each file is replaced as a whole; one that is damaged stays as it is. Raises OSError.
+    Each file is replaced as a whole; a damaged one stays as it is. Raises OSError.
     """
     with held(first.parent, waits=True), held(first, alone=True) as alone:
-        parts = (
-            reversed(parts_of(first)) if alone else ()
-        )  # a file that is replaced is held no more
+        parts = reversed(parts_of(first)) if alone else ()  # a lock is lost with the replaced file
         done = [is_finished(part) or _rewrite(part) for part in parts]
     return alone and all(done)
 
 
 def finish_beside(*firsts: Path, may_wait: bool) -> subprocess.Popen[bytes] | None:
-    """Finish runs without holding up a tick: large ones in one process, which is returned.
+    """Finish runs without a delay of ticks: large ones in one process, which is returned.
 
-    Small ones are finished here where the caller may wait, and else when they are opened. A folder
-    that cannot be written stays as it is. Raises OSError where no process begins.
+    Small ones are finished here where the caller may wait, and otherwise when they are opened. A
+    folder that cannot be written stays as it is. Raises OSError where no process begins.
     """
     large = list[str]()
     for first in firsts:
@@ -88,8 +88,8 @@ def finish_beside(*firsts: Path, may_wait: bool) -> subprocess.Popen[bytes] | No
 
 
 def _rewrite(part: Path) -> bool:
-    """Write the records of a file to another one, and put that in its place; else return False."""
-    from mcap.writer import CompressionType, Writer  # slow, and needed when a run is over
+    """Replace a file by one with its records packed; return False for a file that is not ours."""
+    from mcap.writer import CompressionType, Writer  # a slow import, for ended runs alone
 
     try:
         with replacing(part) as file, part.open("rb") as source:
@@ -105,7 +105,7 @@ def _rewrite(part: Path) -> bool:
 
 
 class _NotOurs(ValueError):
-    """A file is not as our writer has left it: a reader may find more in it than is known here."""
+    """A file unlike those of our writer: other readers may find more in it."""
 
 
 def _copy(found: Iterator[Record], writer: Writer) -> None:

@@ -1,9 +1,9 @@
-"""Where recorded runs lie, how one is found by a few letters, and which are kept.
+"""The folders of recorded runs: their places, the search by a few letters, and the pruning.
 
 Each run has a folder, called by its time, its tree and the first letters of its id, below the state
-directory of the user. Beside the files of events stands a summary, so that a list of runs reads no
-events. A lock on the folder keeps it from being removed, and one on the first file tells that the
-run goes on.
+directory of the user. A summary stands beside the files of events, so that a list of runs reads no
+events. A lock on the folder keeps it from being removed, and a lock on the first file shows that
+the run goes on.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from bt_actions.utilities.whole_file import replace_file, replacing
 FIRST = "run.mcap"
 """The first file of a run in a folder of its own."""
 SUCCEEDED, FAILED = 20, 100
-"""Runs that are kept: of those that went well or were stopped, and of those that did not."""
+"""Runs that are kept: successes and stopped runs, and the rest."""
 BYTES = 500_000_000
-"""Of all kept runs together."""
+"""Bytes of all kept runs together."""
 _LONGEST_SUMMARY = 100_000
 _TEXTS = ("run_id", "tree", "request", "caller", "status", "stopped_by", "cause", "unrecorded")
 UNREADABLE = (
@@ -41,17 +41,17 @@ UNREADABLE = (
     ArithmeticError,
     RecursionError,
 )
-"""What is raised of a summary that is none, or of another version."""
+"""The errors of a summary that is none, or of another version."""
 _STRANGE = re.compile(r"[^\w.-]+", re.ASCII)
 
 
 class NoRun(LookupError):
-    """No recorded run is meant by what was given, or several are."""
+    """A text that means no recorded run, or several."""
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a list says of a run."""
+    """The facts of a run for a list."""
 
     run_id: str
     tree: str
@@ -64,19 +64,19 @@ class Summary:
     where: Mapping[str, str] = field(default_factory=dict)
     """As RunBegan has it: node, domain, host, simulation."""
     status: str = ""
-    """SUCCESS, FAILURE or INVALID; "" while it goes on, and where its process was killed."""
+    """SUCCESS, FAILURE or INVALID; "" while the run goes on, and after its process was killed."""
     stopped_by: str = ""
-    """Who asked it to end before its time: SIGINT, CANCELED, TIMEOUT, ..."""
+    """The author of a stop: SIGINT, CANCELED, TIMEOUT, ..."""
     exit_code: int | None = None
     seconds: float | None = None
     cause: str = ""
-    """Why it failed, on one line."""
+    """The cause of a failure, on one line."""
     unrecorded: str = ""
-    """Since when the run was not recorded, and why, as ``12:03:10: the disk is full``."""
+    """The time and the reason of the end of recording, as ``12:03:10: the disk is full``."""
 
     @property
     def failed(self) -> bool:
-        """Whether it failed, was out of time, or never finished."""
+        """Whether the run failed, was out of time, or never finished."""
         return self.status != "SUCCESS" and self.stopped_by in ("", "TIMEOUT")
 
     @property
@@ -87,7 +87,7 @@ class Summary:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """A recorded run: its first file, and what is known of it without reading that."""
+    """A recorded run: its first file, and its facts without a read of that file."""
 
     first: Path
     summary: Summary
@@ -96,7 +96,7 @@ class Recorded:
 
     @property
     def parts(self) -> list[Path]:
-        """The files of the run, in order; of a long run older ones are gone."""
+        """The files of the run, in order; older ones of a long run are gone."""
         return parts_of(self.first)
 
     @property
@@ -108,18 +108,18 @@ class Recorded:
 def _size(path: Path) -> int:
     try:
         return path.stat().st_size
-    except OSError:  # somebody is removing it
+    except OSError:  # another process removes it
         return 0
 
 
 def home() -> Path:
-    """Return the folder of all recorded runs of this user; it may not exist yet."""
+    """Return the folder of all recorded runs of this user, which may not exist yet."""
     state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
     return Path(state) / "bt_actions" / "runs"
 
 
 def folder_for(run_id: str, tree: str, began: float, where: Path) -> Path:
-    """Make the folder of a new run, which only this user may look into. Raises OSError."""
+    """Make the folder of a new run, with access for this user alone. Raises OSError."""
     when = time.strftime("%Y%m%dT%H%M%S", time.gmtime(began))
     name = _STRANGE.sub("_", tree)[:60] or "tree"
     where.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -143,7 +143,7 @@ def parts_of(first: Path) -> list[Path]:
 
 
 def summary_of(first: Path) -> Path:
-    """Return the file beside the first one that holds the run's summary."""
+    """Return the summary file beside the first file."""
     return first.with_suffix(".json")
 
 
@@ -155,7 +155,7 @@ def write_summary(first: Path, summary: Summary) -> None:
 
 
 def read_summary(first: Path) -> Summary | None:
-    """Return the summary, or None where none can be read."""
+    """Return the summary, or None for an unreadable one."""
     try:
         return read_fields(summary_of(first))[0]
     except UNREADABLE:
@@ -170,7 +170,7 @@ def read_fields(path: Path) -> tuple[Summary, Any]:
     where = {clean(name): clean(str(each)) for name, each in data.get("where", {}).items()}
     code, seconds = data.get("exit_code"), data.get("seconds")
     began = float(data["began"])
-    time.localtime(began)  # raises where no clock can show that
+    time.localtime(began)  # raises for a time that no clock can show
     read = Summary(
         **text,
         began=began,
@@ -199,12 +199,12 @@ def _seen(first: Path) -> Recorded | None:
         if not first.is_file():
             return None
         return Recorded(first, read_summary(first) or _guessed(first), is_written(first))
-    except OSError:  # of another user, or somebody is removing it
+    except OSError:  # another user's, or another process removes it
         return None
 
 
 def _guessed(first: Path) -> Summary:
-    """What the folder's name says of a run whose summary is lost."""
+    """Return the summary that a folder's name allows where the summary is lost."""
     _, _, rest = first.parent.name.partition("-")
     tree, _, run_id = rest.rpartition("-")
     return Summary(clean(run_id), clean(tree), first.stat().st_mtime)
@@ -248,10 +248,10 @@ def find(text: str = "", where: Path | None = None) -> Path:
 
 @contextlib.contextmanager
 def held(path: Path, *, alone: bool = False, waits: bool = False) -> Iterator[bool]:
-    """Hold a folder, so that nobody removes it, or alone a first file, which its writer holds.
+    """Hold a folder, so that no process removes it, or alone a first file, as its writer does.
 
-    Yield whether it is held: not where somebody holds it alone, or with `alone` at all, unless the
-    caller waits for that to end. Raises OSError.
+    Yields whether the lock is held: False where another process holds it alone, or with `alone` at
+    all, unless the caller waits for that to end. Raises OSError.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
@@ -268,9 +268,9 @@ def held(path: Path, *, alone: bool = False, waits: bool = False) -> Iterator[bo
 
 @contextlib.contextmanager
 def locked(path: Path, data: bytes) -> Iterator[None]:
-    """Hold a file with some data alone: who sees the file meanwhile, sees it locked.
+    """Hold a new file with some data alone: the file is locked from its first sight on.
 
-    A process that is killed leaves the file, which is locked no more. Raises OSError.
+    A process that is killed leaves the file unlocked. Raises OSError.
     """
     with replacing(path) as file:
         file.write(data)
@@ -283,9 +283,9 @@ def locked(path: Path, data: bytes) -> Iterator[None]:
 
 
 def is_written(first: Path) -> bool:
-    """Whether a process writes the run, or finishes its files."""
+    """Return whether a process writes the run, or finishes its files."""
     try:
-        with held(first) as is_free:  # not alone: nobody who asks is taken for a writer
+        with held(first) as is_free:  # not alone, so that no asker looks like a writer
             return not is_free
     except OSError:
         return False
@@ -298,7 +298,7 @@ def prune(
     failed: int = FAILED,
     size: int = BYTES,
 ) -> list[Recorded]:
-    """Remove the oldest runs beyond what is kept; return them. Never raises for a folder."""
+    """Remove the oldest runs beyond the limits; return them. Never raises for a folder."""
     left, gone, total = {False: succeeded, True: failed}, list[Recorded](), 0
     for run in recorded(where):
         mine, kind = run.size, run.summary.failed

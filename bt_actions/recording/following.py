@@ -1,6 +1,6 @@
-"""Follows a run while it is written: what has come since the last look, whole records only.
+"""The follower of a run while it is written: new records since the last look, whole ones only.
 
-A file that is finished meanwhile is another file under the same name, which is read from its
+A file that is finished meanwhile becomes another file under the same name, which is read from its
 beginning: the recording knows the number of the latest event.
 """
 
@@ -18,27 +18,30 @@ from bt_actions.recording.reading import Item, Recording
 
 
 class Follower:
-    """Follows one run; nobody removes its folder meanwhile. Close it, or use it as a context."""
+    """The follower of one run, whose folder no process removes meanwhile.
+
+    Close it, or use `with`.
+    """
 
     def __init__(self, first: Path) -> None:
-        """Raises OSError where there is no such run."""
+        """Begin to follow; raises OSError where there is no such run."""
         self._holds = contextlib.ExitStack()
         self._holds.enter_context(held(first.parent, waits=True))
         self.recording = Recording(first)
-        """What is known of the run so far beside its events: files, heartbeat, damage."""
+        """The facts of the run so far beside its events: files, heartbeat, damage."""
         self._part, self._inode = first, 0
         self._at = 0
         """Bytes of the present file that were read."""
 
     def news(self) -> Iterator[Item]:
-        """Yield what has come since the last time: events, and a state where some are missing.
+        """Yield the news since the last time: events, and a state where some are missing.
 
-        Of the files one at most is held in memory. Raises OSError, and ValueError for a file that
-        is none of ours.
+        One file at most is held in memory. Raises OSError, and ValueError for a file that is not
+        ours.
         """
         while True:
             first = self.recording.first
-            parts = parts_of(first)  # first of all: a file is whole once the next one is there
+            parts = parts_of(first)  # first: a file is whole once the next one is there
             later = parts[self._place(parts) + 1 :]
             yield from self._more(is_whole=bool(later) or not is_written(first))
             if not later:
@@ -56,7 +59,7 @@ class Follower:
         self.close()
 
     def _place(self, parts: list[Path]) -> int:
-        """Where the present file stands; before all that there are where it was removed."""
+        """Return the index of the present file; 0 where it was removed."""
         return parts.index(self._part) if self._part in parts else 0
 
     def _turn_to(self, part: Path) -> None:
@@ -65,7 +68,7 @@ class Follower:
     def _more(self, *, is_whole: bool) -> Iterator[Item]:
         try:
             file = self._part.open("rb")
-        except FileNotFoundError:  # the oldest of a long run are removed
+        except FileNotFoundError:  # the oldest files of a long run are removed
             return
         with file:
             inode = os.fstat(file.fileno()).st_ino

@@ -1,8 +1,8 @@
 """The topics of a recording, and their messages as bytes.
 
 A message is written with its fields in the order of its .msg file: a head of fixed size, texts, and
-whatever follows them. The bytes are CDR, little-endian, with zeros in all padding. A transition of
-a node without a text takes 25 bytes. docs/recording.md describes each topic for other readers.
+a tail. The bytes are CDR, little-endian, with zeros in all padding. A transition of a node without
+a text takes 25 bytes. docs/recording.md describes each topic for other readers.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 from bt_actions.messages.definition import ros2msg
 
 _HEADER = b"\x00\x01\x00\x00"
-"""Before each message: CDR, little-endian."""
+"""The bytes before each message: CDR, little-endian."""
 _LONGEST = 64_000_000
 """Bytes of one text that is read."""
 
@@ -24,17 +24,17 @@ class Layout(NamedTuple):
     """The bytes of one message type."""
 
     type: str
-    """In full: ``package/msg/Name``."""
+    """The full name: ``package/msg/Name``."""
     head: struct.Struct
     """The fields of fixed size, padding included."""
     texts: int = 0
-    """How many texts follow the head."""
+    """The number of texts behind the head."""
     tail: bytes = b""
-    """What follows the texts, aligned to 4 bytes."""
+    """The bytes behind the texts, aligned to 4 bytes."""
 
 
 class BadMessage(ValueError):
-    """Bytes are no message of the type that their topic has."""
+    """Bytes that are no message of their topic's type."""
 
 
 _OWN = "bt_actions_interfaces/msg/"
@@ -52,21 +52,21 @@ LAYOUTS = {
     HEARTBEAT: Layout(f"{_OWN}Heartbeat", struct.Struct("<QiId")),
     LOG: Layout("rcl_interfaces/msg/Log", struct.Struct("<iIB"), 4, b"\x00\x00\x00\x00"),
 }
-"""By topic."""
+"""The layouts by topic."""
 CHANNELS = {topic: number for number, topic in enumerate(LAYOUTS, 1)}
 """The number of each topic, and of its schema, in a file that is not finished yet."""
 QOS = {"offered_qos_profiles": ""}
-"""What readers of bags want of a channel."""
+"""The fields of a channel that readers of bags want."""
 
 
 @lru_cache
 def schema_of(topic: str) -> bytes:
-    """Return the message definition of a topic as other readers want it."""
+    """Return the message definition of a topic in the form for other readers."""
     return ros2msg(LAYOUTS[topic].type).encode()
 
 
 def encode(layout: Layout, head: Sequence[object], texts: Sequence[str] = ()) -> bytes:
-    """Return a message as CDR: the fields of its head, and its texts."""
+    """Return a message as CDR, with the fields of its head, and its texts."""
     data = layout.head.pack(*head)
     if not texts:
         return _HEADER + data

@@ -1,8 +1,9 @@
-"""The records of an MCAP file, as many as are whole: of one that is cut, damaged or still written.
+"""The whole records of an MCAP file, also of one that is cut, damaged or still written.
 
-A length that is damaged hides where the next record begins: it is looked for, and the damage costs
-one record. What is passed over is told; of a chunk or an attachment whose checksum is wrong nothing
-is read. Memory is bounded by the longest record that is read, whatever the file claims.
+A damaged length hides the beginning of the next record. The reader looks for that beginning, and
+the damage costs one record. Passed-over bytes are reported; nothing is read of a chunk or an
+attachment with a wrong checksum. Memory is bounded by the longest record that is read, whatever the
+file claims.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ _MESSAGE = struct.Struct("<HIQQ")
 _CHUNK = struct.Struct("<QQQII")
 SCHEMA, CHANNEL, MESSAGE, CHUNK, ATTACHMENT = 3, 4, 5, 6, 9
 _LAST = 15
-"""The highest kind of record that there is."""
+"""The highest kind of record."""
 _LIKELY = re.compile(rb"[\x01-\x0f][\s\S]{4}\x00{4}")
-"""How a record begins whose length has 32 bits at most."""
+"""The beginning of a record whose length has 32 bits at most."""
 
 
 class Message(NamedTuple):
@@ -68,7 +69,7 @@ class Attachment(NamedTuple):
 
 
 class Damage(NamedTuple):
-    """Something that was passed over."""
+    """A part of the file that was passed over."""
 
     why: str
 
@@ -77,11 +78,11 @@ Record = Message | Schema | Channel | Attachment | Damage
 
 
 class NoMcap(ValueError):
-    """A file does not begin as MCAP does."""
+    """A file that does not begin as MCAP does."""
 
 
 def records(file: BinaryIO) -> Iterator[Record]:
-    """Yield the records that tell something, and each damage. Raises NoMcap, OSError."""
+    """Yield the records with content, and each damage. Raises NoMcap, OSError."""
     begin = file.read(len(MAGIC))
     if not MAGIC.startswith(begin):
         raise NoMcap("no MCAP file")
@@ -102,11 +103,11 @@ def message_record(
 
 
 def whole_length(data: bytes) -> int:
-    """Return how many bytes of what was read of a file so far are records, whole or damaged."""
+    """Return the number of bytes, of those read of a file so far, that are records or damage."""
     at = len(MAGIC) if data.startswith(MAGIC) else 0
     while at + _HEAD.size <= len(data):
         _, length = _HEAD.unpack_from(data, at)
-        if length > LONGEST:  # which no more data will make whole
+        if length > LONGEST:  # no more data will make it whole
             return len(data)
         end = at + _HEAD.size + length
         if end > len(data):
@@ -116,7 +117,7 @@ def whole_length(data: bytes) -> int:
 
 
 def _opened(kind: int, payload: bytes) -> Iterator[Record]:
-    """The record of a payload, or those of a chunk, up to a damage."""
+    """Yield the record of a payload, or those of a chunk, up to a damage."""
     try:
         if kind == MESSAGE:
             channel, sequence, log, publish = _MESSAGE.unpack_from(payload)
@@ -147,7 +148,7 @@ def _opened(kind: int, payload: bytes) -> Iterator[Record]:
 
 
 def _text(payload: bytes, at: int) -> tuple[str, int]:
-    """A text with its length before it, and where it ends."""
+    """Return a text with its length before it, and its end."""
     (size,) = struct.unpack_from("<I", payload, at)
     end = at + 4 + size
     if end > len(payload):
@@ -156,7 +157,7 @@ def _text(payload: bytes, at: int) -> tuple[str, int]:
 
 
 def _unpacked(payload: bytes) -> bytes:
-    """The records of a chunk."""
+    """Return the records of a chunk."""
     _, _, size, crc, length = _CHUNK.unpack_from(payload)
     if size > LONGEST:
         raise ValueError("a chunk is too large")
@@ -164,7 +165,7 @@ def _unpacked(payload: bytes) -> bytes:
     packing = payload[_CHUNK.size : at]
     data = payload[at + 8 :]
     if packing == b"zstd":
-        if zstandard.frame_content_size(data) not in (-1, size):  # which zstandard would believe
+        if zstandard.frame_content_size(data) not in (-1, size):  # zstandard would believe the size
             raise ValueError("a chunk is of another size")
         data = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
     elif packing:
@@ -174,13 +175,13 @@ def _unpacked(payload: bytes) -> bytes:
 
 
 def _check(data: bytes, crc: int) -> None:
-    """Raise ValueError for data that are not those of their checksum; 0 is none."""
+    """Raise ValueError for data that do not fit their checksum; 0 is none."""
     if crc and zlib.crc32(data) != crc:
         raise ValueError("a checksum is wrong")
 
 
 def _split(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """The records within a chunk."""
+    """Yield the records within a chunk."""
     at = 0
     while at + _HEAD.size <= len(data):
         kind, length = _HEAD.unpack_from(data, at)
@@ -191,7 +192,7 @@ def _split(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes] | Damage]:
-    """The records of a file, and where one is damaged the next ones.
+    """Yield the records of a file, and after a damage the next ones.
 
     The length of a record is believed unless another record begins before it ends.
     """
@@ -223,24 +224,24 @@ def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes] | Damage]:
             at = next_one
         elif is_end:
             at = len(rest)
-        else:  # nothing likely in sight: keep what a record may begin with
+        else:  # nothing likely in sight: keep the possible beginning of a record
             at = max(at + 1, len(rest) - _HEAD.size)
 
 
 def _follows(rest: bytes, end: int) -> bool:
-    """Whether a record, the magic or nothing begins there."""
+    """Return whether a record, the magic or nothing begins at `end`."""
     after = rest[end : end + len(MAGIC)]
     return after in (b"", MAGIC) or _LIKELY.match(rest, end) is not None
 
 
 def _more(file: BinaryIO, rest: bytes, at: int, size: int) -> tuple[bytes, int, bool]:
-    """Read on: what is there from `at` on, where that now stands, and whether it is all."""
+    """Read on; return the bytes from `at` on, their new place, and whether they are all."""
     data = file.read(size)
     return rest[at:] + data, 0, not data
 
 
 def _found(rest: bytes, at: int) -> int:
-    """Where the next record begins that another one, or the end, follows; -1 for nowhere."""
+    """Return the place of the next record with a record, or the end, behind it; -1 for none."""
     while match := _LIKELY.search(rest, at):
         at = match.start()
         _, length = _HEAD.unpack_from(rest, at)

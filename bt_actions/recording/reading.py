@@ -1,7 +1,7 @@
-"""Reads a recorded run: its events in order, and where files are missing the state behind them.
+"""The reading of a recorded run: its events in order, and the state behind missing files.
 
-What is read may be anybody's file: a damaged record, an event that is none or a number that goes
-back is passed over and counted, and names that never end make an error.
+The file may be a stranger's. A damaged record, an event that is none and a number that goes back
+are passed over and counted; names without end are an error.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ from bt_actions.story.state import State
 MOST_NAMES = 1_000_000
 """Nodes, variables, servers and goals of one run that are read."""
 LAST = 2**53 - 1
-"""The highest number of an event: what JSON holds in every language, and no run reaches."""
+"""The highest number of an event, which JSON holds in every language, and no run reaches."""
 MOST_BYTES = 100_000_000
-"""Of all tree files and other attachments."""
+"""Bytes of all tree files and other attachments."""
 _STATUS = {number: status for status, number in STATUSES.items()}
 _BY_NUMBER = {number: LAYOUTS[topic] for topic, number in CHANNELS.items()}
 _BY_TYPE = {layout.type: layout for layout in LAYOUTS.values()}
@@ -68,7 +68,7 @@ Item: TypeAlias = Event | State
 
 
 class RecordingError(ValueError):
-    """A file is no recording, or none that can be read."""
+    """A file that is no recording, or cannot be read."""
 
 
 class Recording:
@@ -76,7 +76,7 @@ class Recording:
 
     Args:
         first: its first file, or a bag that holds the events of a run.
-        run_id: which run of a bag is meant; the first that it tells of if not given.
+        run_id: the run of a bag that is meant; its first one if not given.
     """
 
     def __init__(self, first: Path, run_id: str = "") -> None:
@@ -86,24 +86,25 @@ class Recording:
         self.damaged = 0
         """Messages that were passed over, and parts of its files that may have held several."""
         self.last_beat: float | None = None
-        """When the process was last known to live, in seconds since 1970."""
+        """The last sign of life of the process, in seconds since 1970."""
         self.tick = 0.0
-        """For how many seconds the tick lasted then."""
+        """Seconds of the tick at that time."""
         self._number = 0
-        """Of the latest event."""
+        """The number of the latest event."""
         self._before = self._known = 0
-        """That of the event before it, and the latest at the beginning of the present file."""
+        """The number of the event before it, and the latest at the beginning of the present
+        file."""
         self._base: int | None = None
         """Nanoseconds by which the log's time is ahead of the steady clock."""
         self._names: set[str] = set()
         self._nodes = self._node = 0
-        """How many there were, and the highest number of one."""
+        """The number of nodes, and the highest number of one."""
         self._attachments = 0
-        """Bytes."""
+        """Bytes of the attachments."""
         self.begin_part()
 
     def state(self) -> State:
-        """Return how the run stands at the end of what is recorded. Raises RecordingError."""
+        """Return the state of the run at the end of its recording. Raises RecordingError."""
         state = State()
         for item in self.items():
             if isinstance(item, State):
@@ -115,9 +116,9 @@ class Recording:
         return state
 
     def items(self) -> Iterator[Item]:
-        """Yield each event, once, in order; and a whole state where what led to it is missing.
+        """Yield each event, once, in order; and a whole state where events before it are missing.
 
-        Before such a state stands an EventsLost with the number of what is missing. Raises
+        An EventsLost with the number of missing events comes before such a state. Raises
         RecordingError.
         """
         for part in parts_of(self.first) or [self.first]:
@@ -131,12 +132,12 @@ class Recording:
                 raise RecordingError(f"{part} cannot be read: {error.strerror}") from error
 
     def begin_part(self) -> None:
-        """Take note that what is read next is another file, with numbers of its own for topics."""
+        """Take note that another file follows, with numbers of its own for topics."""
         self._layouts, self._schemas = dict(_BY_NUMBER), dict[int, str]()
         self._known = self._number
 
     def items_in(self, file: BinaryIO) -> Iterator[Item]:
-        """Yield what is in a file, or in more of it; raises NoMcap, OSError, RecordingError."""
+        """Yield the items of a file, or of more of it; raises NoMcap, OSError, RecordingError."""
         for record in records(file):
             if isinstance(record, Message):
                 layout = self._layouts.get(record.channel)
@@ -166,7 +167,7 @@ class Recording:
             self.sources[path] = attachment.data.decode("utf-8", "replace")
 
     def _taken(self, message: Message, layout: Layout) -> Iterator[Item]:
-        """The event or the state that a message holds, unless it is known."""
+        """Yield the event or the state of a message, unless it is known."""
         try:
             head, texts = decode(layout, message.data)
             if layout is _HEARTBEAT and self._base is not None:
@@ -178,7 +179,7 @@ class Recording:
             elif layout is _STATE and self._is_meant(head[0]):
                 yield from self._state(texts[1], message.log_time)
             elif layout is _STATE:
-                self._base = None  # of another run, as what follows is
+                self._base = None  # the rest is of another run
         except (BadMessage, WireError, TypeError, ValueError):
             self.damaged += 1
 
@@ -186,13 +187,13 @@ class Recording:
         return not self._run_id or _hex(run_id) == self._run_id
 
     def _event(self, text: str, log_time: int, run_id: str) -> Iterator[Item]:
-        if not text:  # values that were not for whoever has recorded a bag
+        if not text:  # values that were hidden from the recorder of a bag
             return
         event = from_line(text)
         self._base = log_time - nanoseconds(event.at.steady)
         if not self._goes_on(event.at.number):
             return
-        if isinstance(event, EventsLost):  # which has the number of the event behind it
+        if isinstance(event, EventsLost):  # it has the number of the event behind it
             self._number = self._before
         if isinstance(event, RunBegan):
             self._node = 0
@@ -204,9 +205,9 @@ class Recording:
         yield event
 
     def _goes_on(self, number: int) -> bool:
-        """Take note of the number of an event unless it goes back.
+        """Take note of the number of an event; return False for one that goes back.
 
-        One that is damaged and far ahead costs none of those behind it.
+        A damaged number that is far ahead costs no event behind it.
         """
         if number > LAST:
             self.damaged += 1
@@ -232,7 +233,7 @@ class Recording:
     def _transition(self, message: Message, head: tuple[object, ...]) -> Iterator[Item]:
         number, seconds, rest, node, status, by_itself = head
         if self._base is None or number == self._number or not isinstance(number, int):
-            return  # the event before says more of the same
+            return  # the event before has more of the same
         if not self._goes_on(number):
             return
         steady = (message.log_time - self._base) / 10**9
@@ -254,7 +255,7 @@ class Recording:
         yield state
 
     def _check(self, item: Item) -> None:
-        """Bound what a hostile file can make a reader keep."""
+        """Bound the memory that a hostile file can claim."""
         if isinstance(item, VariableWritten):
             self._names.add(item.name)
         elif isinstance(item, ServerSeen):

@@ -1,8 +1,8 @@
-"""Records runs on a thread of its own: one thread for all runs of a process.
+"""The recorder of runs, on a thread of its own: one thread for all runs of a process.
 
 The thread takes the events of each run twenty times a second, lets go of Python's lock after each
-one, and writes what came as one batch: no tick waits for it. A run that is killed loses what came
-since the last batch.
+one, and writes them as one batch: no tick waits for it. A run that is killed loses its events since
+the last batch.
 """
 
 from __future__ import annotations
@@ -48,32 +48,33 @@ PATIENCE = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What is to be recorded, and where."""
+    """The wishes for a recording: its place and its content."""
 
     where: Path | None = None
-    """The folder that gets a folder for each run; the user's state directory if not given."""
+    """The folder of the runs' folders; the user's state directory if not given."""
     first: Path | None = None
     """The first file itself, for one run."""
     values: bool = True
     """Whether goals, results, feedback, variables and inputs are kept."""
     why_not: str = ""
-    """Why nothing is to be kept, or ""; that such a run goes on is told all the same."""
+    """The reason against a recording, or ""; such a run is told all the same while it goes on."""
 
 
 class Recorder:
-    """Writes the runs of this process, until it is closed."""
+    """The writer of this process's runs, until it is closed."""
 
     def __init__(self, wish: Wish, say: Callable[[str], None]) -> None:
-        """`say` is given, on the recorder's thread, what a user should know of a recording."""
+        """Make a recorder; `say` gets, on the recorder's thread, news for the user."""
         self._wish, self._say = wish, say
         self._runs: list[_Run] = []
         self._lock = threading.Lock()
         self._batches = Batches("recorder", self._step)
 
     def record(self, stream: Stream, tick: Callable[[], float | None]) -> _Run:
-        """Record what happens from now on in a run, until its RunEnded.
+        """Record a run from now on, until its RunEnded.
 
-        `tick` returns when the present tick began, on the steady clock; None between two ticks.
+        `tick` returns the beginning of the present tick, on the steady clock; None between two
+        ticks.
         """
         run = _Run(stream, stream.reader(self._batches.poke), tick, self._wish, self._tell)
         with self._lock:
@@ -83,7 +84,7 @@ class Recorder:
         return run
 
     def close(self) -> None:
-        """Write what is left of all runs, ended or not."""
+        """Write the rest of all runs, ended or not."""
         self._batches.close(PATIENCE)
 
     # On the recorder's thread
@@ -100,7 +101,7 @@ class Recorder:
         if run.first is not None:
             with contextlib.suppress(OSError):
                 finish_beside(run.first, may_wait=not self._runs)
-            if self._wish.first is None and self._wish.where is None:  # else it is kept for good
+            if self._wish.first is None and self._wish.where is None:  # else it is kept
                 prune()
 
     def _tell(self, text: str) -> None:
@@ -109,7 +110,7 @@ class Recorder:
 
 
 class _Run:
-    """One run that is recorded."""
+    """One run under recording."""
 
     def __init__(
         self,
@@ -123,12 +124,12 @@ class _Run:
         self._wish, self._say = wish, say
         self._began: RunBegan | None = None
         self._early: list[Event] = []
-        """What came before the run began."""
+        """Events from before RunBegan."""
         self._unrecorded = ""
-        """Since when nothing is recorded, and why, or ""."""
+        """The time and the reason of the end of recording, or ""."""
         self._is_over = self._is_broken = False
         self._later: list[Event] = []
-        """What came while the step before was at it: a heartbeat stands before it."""
+        """Events that came during the step before: a heartbeat stands before them."""
         self._writer: RunWriter | None = None
         self._locks = contextlib.ExitStack()
         self._beat = 0.0
@@ -136,10 +137,10 @@ class _Run:
         """The first file, once the run has begun."""
 
     def step(self, now: float, *, last: bool) -> bool:
-        """Write what has come until now; return whether nothing more is written."""
+        """Write all news until now; return whether the writing is over."""
         try:
             self._write(now, last=last)
-        except Exception as error:  # noqa: BLE001 - a bug, from which no other run may suffer
+        except Exception as error:  # noqa: BLE001 - a bug; no other run may suffer from it
             where = traceback.extract_tb(error.__traceback__)[-1]
             place = f"{where.filename}:{where.lineno}"
             self._say(f"this run is not recorded any further: {error!r} ({place})")
@@ -158,7 +159,7 @@ class _Run:
                 self._began = event
                 self._begin(event)
             self._take(event)
-            time.sleep(0)  # whoever waits for Python's lock is next
+            time.sleep(0)  # a thread that waits for Python's lock is next
         writer = self._writer
         if writer is not None and not self._unrecorded:
             if now - self._beat >= BEAT and not self._is_over:
@@ -177,7 +178,7 @@ class _Run:
             self._early.append(event)
 
     def _lose(self, since: float, why: str) -> None:
-        """Have it told, until the run is over, that nothing is recorded from now on."""
+        """Have the end of the recording told, until the run is over."""
         if self._began is not None and not self._unrecorded:
             self._unrecorded = since_text(since, why)
             known = begun(self._began, values=self._wish.values)
@@ -185,7 +186,7 @@ class _Run:
                 self._locks.enter_context(told(known, since, why))
 
     def _begin(self, began: RunBegan) -> None:
-        """Make the run's files; say it where that cannot be done."""
+        """Make the run's files; say so where that fails."""
         wish, made = self._wish, contextlib.ExitStack()
         if wish.why_not:
             self._lose(began.at.wall, wish.why_not)
@@ -216,11 +217,11 @@ class _Run:
         self._early.clear()
 
     def end(self) -> None:
-        """Close the files, and let go of all."""
+        """Close the files, and release all locks."""
         self._stream.leave(self._reader)
         with self._locks:
             if self._writer is not None and self.first is not None:
-                with contextlib.suppress(OSError):  # which was said where it matters: of the events
+                with contextlib.suppress(OSError):  # a failure was told at the events
                     self._writer.close()
                     if self._writer.state.began is not None:
                         ended = summary(self._writer.state)
@@ -228,7 +229,7 @@ class _Run:
 
 
 def begun(began: RunBegan, *, values: bool = True) -> Summary:
-    """Return what a list says of a run that has just begun."""
+    """Return the summary of a run that has just begun."""
     kept = began if values else bare(began)
     assert isinstance(kept, RunBegan)
     asked_by = kept.request, kept.caller
@@ -236,7 +237,7 @@ def begun(began: RunBegan, *, values: bool = True) -> Summary:
 
 
 def summary(state: State) -> Summary:
-    """Return what a list says of a run as it stands; `state` knows its beginning."""
+    """Return the summary of a run as it stands; `state` knows its beginning."""
     began, finished, ended = state.began, state.finished, state.ended
     assert began is not None
     over = finished is not None or ended is not None
@@ -256,7 +257,7 @@ def summary(state: State) -> Summary:
 
 
 def _cause(state: State) -> str:
-    """Why a run has not succeeded, on one line that begins with a node's name."""
+    """Return the cause of a failure, on one line that begins with a node's name."""
     if state.finished is not None and state.finished.error:
         return state.finished.error
     for failure in (*state.failures, *state.stopped):

@@ -1,7 +1,7 @@
-"""One text of a recorded run: what it was, why it failed, what its actions did, and when.
+"""One text of a recorded run: its description, the cause of its failure, its actions, its events.
 
-The runs below the leaves that failed in it (RunTree) are told behind it, as far as this machine has
-recorded them.
+The runs below its failed leaves (RunTree) are told behind it, as far as this machine has recorded
+them.
 """
 
 from __future__ import annotations
@@ -26,33 +26,33 @@ from bt_actions.utilities.shorten import MESSAGE, brief, fit, shorten
 FIRST, LAST = 50, 150
 """Lines of a long run that are kept: from its beginning, and from its end."""
 LEVELS = 8
-"""Runs that are told of at most, each below a leaf of the one before."""
+"""Runs that are told at most, each below a leaf of the one before."""
 TICK = 0.1
-"""Seconds from which on a tick is told to have lasted when its process was killed."""
+"""Seconds of a tick from which on it is told, when its process was killed."""
 _PLACE = ("node", "domain", "host")
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What is told of one run."""
+    """The report on one run."""
 
     recording: Recording
-    """As it was read to its end."""
+    """The recording, read to its end."""
     state: State
-    """Behind the last event."""
+    """The state behind the last event."""
     begins: tuple[Line, ...]
     ends: tuple[Line, ...]
     left_out: int
     """Lines between these."""
     lost: int
-    """Events that are not in the recording."""
+    """Events that are missing in the recording."""
     goes_on: bool
     values: bool
     leaf: str = ""
     """The RunTree leaf, of the report before, whose goal the run answers."""
 
     def lines(self, *, full: bool = False) -> Iterator[Line | str]:
-        """Yield what happened; in place of what is left out a text. Raises RecordingError.
+        """Yield the lines of the run, and a text in place of left-out ones. Raises RecordingError.
 
         All of it is read anew, so that a run of any length takes little memory.
         """
@@ -71,7 +71,7 @@ class Report:
 
     @property
     def lived(self) -> float:
-        """Seconds from the run's beginning until its process was last known to live."""
+        """Seconds from the run's beginning until the last sign of life of its process."""
         beat, began = self.recording.last_beat, self.state.began
         assert began is not None
         return max(self.state.elapsed, 0.0 if beat is None else beat - began.at.wall)
@@ -84,7 +84,7 @@ class Report:
 
     @property
     def ending(self) -> str:
-        """How the run ended, in a few words."""
+        """The end of the run, in a few words."""
         state = self.state
         if not self.is_over:
             return "goes on" if self.goes_on else "never finished"
@@ -97,20 +97,20 @@ def reports(first: Path, *, values: bool = True, where: Path | None = None) -> l
 
     Args:
         first: the run's first file.
-        values: whether goals, results and whatever else the robot moved by are told.
+        values: whether goals, results and other values of the robot's are told.
         where: the folder of recorded runs in which those below are looked for.
 
     Raises RecordingError.
     """
     found = [_read(first, values)]
     below = {each.summary.request: each for each in _beside(first, where) if each.summary.request}
-    for above in found:  # which grows
+    for above in found:  # the list grows
         for goal_id, leaf in _asked(above.state):
             run: Recorded | None = below.pop(goal_id, None)
             if run is not None and len(found) < LEVELS:
                 try:
                     found.append(_read(run.first, values, leaf))
-                except RecordingError:  # of which the leaf above has told the end
+                except RecordingError:  # the leaf above has told its end
                     continue
     return found
 
@@ -150,7 +150,7 @@ def _read(first: Path, values: bool, leaf: str = "") -> Report:
 
 
 def _beside(first: Path, where: Path | None) -> list[Recorded]:
-    """The recorded runs among which those below a run may be."""
+    """Return the recorded runs among which those below a run may be."""
     folders = {home() if where is None else where, first.absolute().parent.parent}
     return [each for folder in folders for each in recorded(folder)]
 
@@ -177,7 +177,7 @@ def text(found: Iterable[Report], *, full: bool = False, width: int = MESSAGE) -
 
 
 def markdown(found: Iterable[Report], *, full: bool = False) -> Iterator[str]:
-    """Yield the lines of reports as Markdown; nothing in them is taken for Markdown or HTML."""
+    """Yield the lines of reports as Markdown; no text in them can become Markdown or HTML."""
     for number, report in enumerate(found):
         yield from [""] if number else []
         yield f"{'##' if number else '#'} {_code(title(report))}"
@@ -189,7 +189,7 @@ def markdown(found: Iterable[Report], *, full: bool = False) -> Iterator[str]:
 
 
 def title(report: Report) -> str:
-    """Say which run is told of, and how that ended."""
+    """Say which run it is, and how it ended."""
     below = f"below {report.leaf}: " if report.leaf else ""
     return clean(f"{below}{report.state.tree}: {report.ending}")
 
@@ -230,7 +230,7 @@ def _head(report: Report) -> Iterator[str]:
         yield ", ".join(f"{name} {version}" for name, version in began.versions.items())
     if report.files:
         yield f"tree files {', '.join(report.files)}"
-    if report.values:  # the name of a folder is nobody's business either
+    if report.values:  # the name of a folder is private, too
         more = len(parts_of(recording.first)) - 1
         yield f"recorded in {recording.first}{f' and {more} more files' if more > 0 else ''}"
     if state.ended is not None and state.ended.world:

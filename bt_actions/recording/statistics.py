@@ -1,4 +1,4 @@
-"""What the goals of each action came to over many runs: outcomes, and the seconds of each phase."""
+"""The figures of each action's goals over many runs: outcomes, and the seconds of each phase."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Which: TypeAlias = tuple[str, str]
 
 
 class Spread(NamedTuple):
-    """Seconds of many goals: as long as half of them took at most, 95 in a hundred, and all."""
+    """Seconds of many goals: the limit for half of them, for 95 in a hundred, and for all."""
 
     goals: int
     p50: float
@@ -37,18 +37,18 @@ class Spread(NamedTuple):
 
 @dataclass(slots=True)
 class Figures:
-    """Of the goals of one action."""
+    """The figures of the goals of one action."""
 
     runs: int = 0
     attempts: int = 0
     """Goals that a leaf wished for."""
     sent: int = 0
     outcomes: Counter[str] = field(default_factory=Counter)
-    """Of the attempts that came to one, as the leaf judged them."""
+    """The outcomes of the attempts, as the leaf judged them."""
     seconds: defaultdict[str, array[float]] = field(
         default_factory=lambda: defaultdict(lambda: array("d"))
     )
-    """By state, of each goal that has left it."""
+    """Seconds by state, of each goal that has left it."""
 
     @property
     def success(self) -> float | None:
@@ -58,7 +58,7 @@ class Figures:
 
     @property
     def phases(self) -> dict[str, Spread]:
-        """By state, in the order in which a goal passes them."""
+        """The spread by state, in the order in which a goal passes them."""
         return {state: _spread(self.seconds[state]) for state in PHASES if state in self.seconds}
 
 
@@ -73,13 +73,13 @@ class _Goal:
 
 
 class Statistics:
-    """Counts one run after another."""
+    """The count over one run after another."""
 
     def __init__(self) -> None:
         self.actions: defaultdict[Which, Figures] = defaultdict(Figures)
 
     def add(self, items: Iterable[Item]) -> None:
-        """Count a run as a whole, or not at all where reading it raises RecordingError."""
+        """Count a run as a whole, or not at all where its reading raises RecordingError."""
         types, goals = dict[int, str](), dict[str, _Goal]()
         for item in items:
             match item:

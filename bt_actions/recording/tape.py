@@ -1,6 +1,6 @@
-"""A whole recording in memory, packed: how the run stood after any of its events, soon.
+"""A whole recording in memory, packed, for quick access to the state after any of its events.
 
-Events lie in blocks, each behind the state before it. So going back folds one block at most, and a
+Events lie in blocks, each behind the state before it. So a step back folds one block at most, and a
 recording takes about as much memory as its finished file does on disk.
 """
 
@@ -23,17 +23,17 @@ BLOCK = 300_000
 
 
 class Tape:
-    """The events of a recording. A position is how many of them have happened."""
+    """The events of a recording. A position is the number of events before it."""
 
     def __init__(self, recording: Recording, progress: Callable[[int], None] = lambda _: None):
-        """Read it all; `progress` is told how many events that are so far.
+        """Read it all; `progress` gets the number of events so far.
 
         Raises RecordingError.
         """
         self.times = array("d")
-        """When each event happened, in seconds on the steady clock."""
+        """The moment of each event, in seconds on the steady clock."""
         self.failures: list[int] = []
-        """The positions behind each failure of a leaf, and of a node that failed of itself."""
+        """The positions behind each failure of a leaf, and of a node that failed by itself."""
         self._starts, self._blocks = [0], list[bytes]()
         self._states = [b""]
         """The state before each block; nothing before the first."""
@@ -60,7 +60,7 @@ class Tape:
         if state.began is None:
             raise RecordingError(f"{recording.first} holds no run")
         self.end = state
-        """How the run stands behind the last event."""
+        """The state behind the last event."""
         self._block, self._lines = -1, list[str]()
         self._position, self._state = 0, State()
 
@@ -68,7 +68,7 @@ class Tape:
         return len(self.times)
 
     def seek(self, position: int) -> State:
-        """Return how the run stands at a position; it is the tape's own until the next call."""
+        """Return the state at a position; the object is the tape's own until the next call."""
         block = bisect_right(self._starts, position) - 1
         start = self._starts[block]
         if block != self._block:
@@ -84,7 +84,7 @@ class Tape:
         return self._state
 
     def after(self, moment: float) -> int:
-        """Return the position behind all that has happened by a moment on the steady clock."""
+        """Return the position behind all events up to a moment on the steady clock."""
         return bisect_right(self.times, moment)
 
 
@@ -93,13 +93,13 @@ def _packed(lines: list[str]) -> bytes:
 
 
 def _fails(state: State, event: Event) -> bool:
-    """Whether a node fails of itself; of one that fails again and again, the first time."""
+    """Return whether a node fails by itself; for repeated failures, the first time."""
     if not isinstance(event, NodeChanged) or event.status is not Status.FAILURE:
         return False
     story = state.nodes.get(event.node)
     if story is None or not (story.is_leaf or event.by_itself):
         return False
     parent = state.nodes.get(story.node.parent or 0)
-    if parent is not None and parent.node.kind == "invert":  # to which it is none
+    if parent is not None and parent.node.kind == "invert":  # for it a failure is none
         return False
     return bool(story.node.server) or story.status is not Status.FAILURE

@@ -1,7 +1,7 @@
-"""A recorded run as lines for people: one for each thing that happened and that somebody cares for.
+"""A recorded run as lines for people: one for each event that they care for.
 
 A node gets a line when it ends, a goal when it is sent and when its leaf has judged it. Feedback,
-and what a tick does on its way, have none.
+and statuses within a tick, have none.
 """
 
 from __future__ import annotations
@@ -46,16 +46,16 @@ from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import brief, fit, shorten
 
 WAITED = 1.0
-"""Seconds from which on it is told that a goal had to wait before it was sent."""
+"""Seconds that a goal waited before it was sent, from which on the wait is told."""
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One thing that happened."""
+    """One event in words."""
 
     at: Moment
     seconds: float
-    """Since the run began."""
+    """Seconds since the run began."""
     kind: str
     """SUCCESS, FAILURE, STOPPED, goal, round, variable, log, server, ..."""
     text: str
@@ -69,14 +69,14 @@ class Line:
 
 
 class Timeline:
-    """The lines of a recording, in order; `state` is how the run stands behind the last of them."""
+    """The lines of a recording, in order; `state` is the state behind the last of them."""
 
     def __init__(self, recording: Recording, *, values: bool = True) -> None:
-        """Without `values`, nothing of the robot's values is told, nor kept in the state."""
+        """Make the lines; without `values`, no value of the robot's is told, or kept in `state`."""
         self.recording, self._values = recording, values
         self.state = State()
         self.lost = 0
-        """Events that are not in the recording."""
+        """Events that are missing in the recording."""
         self._names: dict[tuple[str, ...], str] = {}
 
     def __iter__(self) -> Iterator[Line]:
@@ -106,14 +106,14 @@ class Timeline:
         yield Line(event.at, event.at.steady - state.started, kind, text, node, path)
 
     def _called(self, path: tuple[str, ...]) -> str:
-        """A node's name, behind as much of its path as tells it apart from others."""
+        """Return a node's name, behind the part of its path that tells it apart from others."""
         if path not in self._names:
             state = self.state
             self._names = told_apart([state.path(each) for each in state.nodes])
         return self._names.get(path, "")
 
     def _words(self, event: Event, was: Status) -> tuple[str, str]:
-        """The kind of an event's line, and its text; "" for an event that has no line."""
+        """Return the kind of an event's line, and its text; "" for an event without a line."""
         match event:
             case NodeChanged():
                 return self._node(event, was)
@@ -167,12 +167,12 @@ class Timeline:
         return "", ""
 
     def _node(self, event: NodeChanged, was: Status) -> tuple[str, str]:
-        """A node that has ended, or a leaf that was stopped."""
+        """Return the words for a node that has ended, or a leaf that was stopped."""
         story, state = self.state.nodes[event.node], self.state
         is_stopped = event.status is Status.INVALID and was is Status.RUNNING and story.is_leaf
         if event.status not in OVER and not is_stopped:
             return "", ""
-        if story.node.kind == "log" and event.status is Status.SUCCESS:  # it has said so
+        if story.node.kind == "log" and event.status is Status.SUCCESS:  # its message has a line
             return "", ""
         text = event.warning or event.message
         action = state.action(event.node) if state.acts(event.node) else None
@@ -181,16 +181,16 @@ class Timeline:
         return _word(event.status), brief(text) if action is None else text
 
     def _again(self, event: AttemptEnded) -> tuple[str, str]:
-        """An attempt that another one follows."""
+        """Return the words for an attempt that another one follows."""
         action = self.state.action(event.node)
         goal = action.goals.get(event.goal_id)
-        if goal is None:  # of which an event is damaged
+        if goal is None:  # an event of the goal is damaged
             return "", ""
         told = f"attempt {event.attempt} of {action.of}: {attempt_text(action, goal)}"
         return "goal", f"{told}; again in {event.again_in:.1f} s"
 
     def _goal(self, event: GoalChanged) -> str:
-        """A goal that is sent, or that has ended after its leaf had left it."""
+        """Return the text for a goal that is sent, or that has ended after its leaf had left it."""
         action, story = self.state.action(event.node), self.state.nodes[event.node]
         goal = action.goals[event.goal_id]
         if event.state == "SENDING":
@@ -209,7 +209,7 @@ class Timeline:
 
 
 def _judged(action: ActionStory, goal: GoalStory) -> str:
-    """What became of the last attempt of a visit; "" where its leaf never got that far."""
+    """Return the words for the last attempt of a visit; "" where its leaf never got that far."""
     if goal.outcome is None:
         return ""
     of = f" (attempt {action.attempt} of {action.of})" if action.attempt > 1 else ""

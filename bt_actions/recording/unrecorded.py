@@ -1,7 +1,7 @@
-"""Runs that go on and are not recorded, or no further: each is told in a file in memory.
+"""Runs that go on without a recording, or with an ended one: each has a file in memory.
 
-A disk may be full, so the file lies where the ledger does; its process holds it locked, and removes
-it when the run is over. Nobody else reads anything from such a run.
+A disk may be full, so the file lies where the ledger does. Its process holds it locked, and removes
+it when the run is over. No other trace of such a run is readable.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ _SUFFIX = ".unrecorded"
 
 @dataclass(frozen=True, slots=True)
 class Unrecorded:
-    """A run that goes on, of which more happens than is recorded."""
+    """A run that goes on without a full recording."""
 
     summary: Summary
     since: float
-    """Seconds since 1970: when the recording ended, or else the run began."""
+    """Seconds since 1970: the end of the recording, or else the beginning of the run."""
     why: str
 
     def __str__(self) -> str:
@@ -39,9 +39,9 @@ def since_text(since: float, why: str) -> str:
 
 @contextlib.contextmanager
 def told(summary: Summary, since: float, why: str) -> Iterator[None]:
-    """Have it told meanwhile that a run is not recorded. Raises OSError."""
+    """Have other processes told meanwhile that a run is not recorded. Raises OSError."""
     for left in _files():
-        if not is_written(left):  # its process was killed
+        if not is_written(left):  # the file's process was killed
             left.unlink(missing_ok=True)
     path = directory() / f"{summary.run_id}{_SUFFIX}"
     with locked(path, as_json({**asdict(summary), "since": since, "why": why}).encode()):
@@ -52,7 +52,7 @@ def told(summary: Summary, since: float, why: str) -> Iterator[None]:
 
 
 def unrecorded() -> list[Unrecorded]:
-    """Return the runs of this user that go on and are not recorded, or no further."""
+    """Return the runs of this user that go on without a full recording."""
     found = []
     for path in _files():
         with contextlib.suppress(*UNREADABLE):
@@ -65,5 +65,5 @@ def unrecorded() -> list[Unrecorded]:
 def _files() -> list[Path]:
     try:
         return sorted(directory(make=False).glob(f"*{_SUFFIX}"))
-    except OSError:  # nothing is told
+    except OSError:  # no run is told
         return []

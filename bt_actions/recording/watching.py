@@ -1,6 +1,7 @@
-"""What runs now: each run of this user that goes on, what it waits for, and how it ended.
+"""The runs that go on now: each run of this user, what it waits for, and how it ended.
 
-Follows the recordings. No time is made up: a clock stands where a run gives no sign of life.
+The watch follows the recordings. No time is made up: a clock stands where a run gives no sign of
+life.
 """
 
 from __future__ import annotations
@@ -23,19 +24,19 @@ from bt_actions.story.why import why
 from bt_actions.story.words import judged, left_open, troubles, verdict_on
 
 STALE = 2.5
-"""Seconds without a sign of life from which on a run is told to be stale: two heartbeats."""
+"""Seconds without a sign of life from which on a run counts as stale: two heartbeats."""
 AHEAD = 1.2
 """Seconds for which a clock goes on behind a sign of life, at most."""
 EACH = 1.0
-"""Seconds between two looks for runs that have begun."""
+"""Seconds between two looks for new runs."""
 _LOOKS = {Status.SUCCESS: "success", Status.FAILURE: "failure", Status.INVALID: "stopped"}
 KEPT = 60.0
-"""Seconds for which a run that has ended is told."""
+"""Seconds for which an ended run is told."""
 
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """How one run stands, in words."""
+    """The standing of one run, in words."""
 
     summary: Summary
     word: str
@@ -43,15 +44,15 @@ class Seen:
     look: str
     """running, waiting, success, failure, stopped or lost."""
     seconds: float
-    """For how long it has run, as far as that is known."""
+    """Seconds that it has run, as far as is known."""
     is_over: bool
     why: tuple[str, ...] = ()
-    """What it waits for, or why it failed."""
+    """The reasons why it waits, or has failed."""
     state: State = field(default_factory=State, compare=False)
 
 
 class Watch:
-    """Follows all runs that are meant; close it in the end."""
+    """The follower of all runs that are meant; close it in the end."""
 
     def __init__(self, is_meant: Callable[[Summary], bool] = lambda _: True) -> None:
         self._is_meant = is_meant
@@ -61,9 +62,9 @@ class Watch:
         self._unrecorded: dict[str, Unrecorded] = {}
 
     def look(self) -> list[Seen]:
-        """Return how the runs stand that go on, or have ended since, in the order of their names.
+        """Return the runs that go on, or have ended since the first look, ordered by name.
 
-        A run that was over before the first look is not told.
+        A run that was over before the first look is left out.
         """
         now = time.monotonic()
         if now - self._looked >= EACH:
@@ -91,11 +92,11 @@ class Watch:
                 continue
             self._known.add(run.first)
             if self._is_meant(run.summary) and (run.is_written or not is_first):
-                with contextlib.suppress(OSError):  # somebody removes it
+                with contextlib.suppress(OSError):  # another process removes it
                     self._runs[run.first] = _Run(run)
 
     def close(self) -> None:
-        """Let go of all runs."""
+        """Stop to follow all runs."""
         for each in self._runs.values():
             each.close()
 
@@ -109,14 +110,14 @@ class _Run:
         self._state = State()
         self._last = Seen(run.summary, "begins", "waiting", 0.0, is_over=False)
         self._seen_at = run.summary.began
-        """When the run last gave a sign of life, in seconds since 1970."""
+        """The last sign of life of the run, in seconds since 1970."""
         self.ended: float | None = None
-        """When it was seen to be over, on the steady clock."""
+        """The moment at which the run was seen to be over, on the steady clock."""
 
     def look(self, lost: Mapping[str, Unrecorded]) -> Seen:
-        """Return how the run stands."""
+        """Return the standing of the run."""
         if self._follower is not None:
-            goes_on = is_written(self._first)  # before the news: they are all there are, if not
+            goes_on = is_written(self._first)  # before the news: if not, they are the last
             try:
                 for item in self._follower.news():
                     if isinstance(item, State):
@@ -135,7 +136,7 @@ class _Run:
         return self._last
 
     def close(self) -> None:
-        """Let go of the run."""
+        """Stop to follow the run."""
         if self._follower is not None:
             self._follower.close()
             self._follower = None
@@ -175,7 +176,7 @@ class _Run:
 
 
 def span(seconds: float) -> str:
-    """Say how long something lasts, in a word."""
+    """Say a duration in a word."""
     for unit, name in ((86400, "days"), (3600, "h"), (60, "min")):
         if seconds >= 2 * unit:
             return f"{seconds // unit:.0f} {name}"

@@ -1,8 +1,8 @@
-"""Writes the events of one run into its files, as they come. Never raises for what a disk does.
+"""The writing of one run's events into its files, as they come. No error of a disk is raised.
 
-A file is MCAP without chunks: each batch of records is one `write`, so that a process that is
-killed leaves whole records. A run that grows gets a new file every 10 MB, which begins with the
-state of the run; of a run beyond 100 MB the oldest files go, the first excepted.
+A file is MCAP without chunks: each batch of records is one `write`, so that a killed process leaves
+whole records. A run that grows gets a new file every 10 MB, which begins with the state of the run;
+of a run beyond 100 MB the oldest files go, the first excepted.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ FILE = 10_000_000
 FILES = 10
 """Files of one run, at most."""
 THIN_FROM = 5
-"""The file from which on feedback is thinned: a run that is so long shall keep its goals."""
+"""The file from which on feedback is thinned: so long a run shall keep its goals."""
 THINNED = 1.0
 """Seconds between two feedback events of one goal in a long run."""
 STATUSES = {Status.INVALID: 1, Status.RUNNING: 2, Status.SUCCESS: 3, Status.FAILURE: 4}
@@ -79,8 +79,8 @@ class RunWriter:
     ) -> None:
         """Make the first file, which must not exist; raises OSError.
 
-        `values` tells whether goals, results and the like are kept; `size` is in bytes; `say` is
-        given what a user should know, in words.
+        `values` tells whether goals, results and the like are kept; `size` is in bytes; `say` gets
+        news for the user, in words.
         """
         self.state = State()
         self.first, self._values, self._size, self._files = first, values, size, files
@@ -90,9 +90,9 @@ class RunWriter:
         """Nanoseconds from the steady clock to the log's time, which so never goes back."""
         self._number = 0
         self._feedback: dict[str, float] = {}
-        """When the latest feedback of each goal was kept, in a long run."""
+        """The moment of the latest kept feedback of each goal, in a long run."""
         self.failed = ""
-        """Why nothing is written any more, or ""."""
+        """The reason why nothing is written any more, or ""."""
         self._buffer = io.BytesIO()
         self._written = self._head = 0
         """Bytes of the present file, and of the state with which it begins."""
@@ -122,12 +122,12 @@ class RunWriter:
             self._begin_part()
 
     def beat(self, steady: float, wall: float, ros: float, tick: float) -> None:
-        """Tell that the process lives; `tick` is for how many seconds the present tick lasts."""
+        """Record a sign of life of the process; `tick` is the seconds of the present tick."""
         at = Moment(self._number, steady, wall, ros)
         self._message(HEARTBEAT, at, encode(LAYOUTS[HEARTBEAT], (at.number, *stamp(ros), tick)))
 
     def flush(self) -> None:
-        """Write what has been taken in, to the kernel; what does not fit is taken back."""
+        """Write the taken events to the kernel; those that do not fit are taken back."""
         data = self._buffer.getvalue()
         self._buffer.seek(0)
         self._buffer.truncate()
@@ -141,14 +141,14 @@ class RunWriter:
             self._written += len(data)
 
     def close(self) -> None:
-        """Write what is left, and close the file."""
+        """Write the rest, and close the file."""
         self.flush()
         self._close()
 
     # Within
 
     def _open(self) -> None:
-        """Begin a file: its header, and what its topics hold."""
+        """Begin a file: its header, and its topics."""
         self._buffer.write(MAGIC)
         self._record(Header("ros2", "bt_actions"))
         self._sequences = dict.fromkeys(LAYOUTS, 0)
@@ -185,7 +185,7 @@ class RunWriter:
         self._head = self._buffer.tell()
 
     def _close(self) -> None:
-        with contextlib.suppress(OSError):  # of a disk that is gone: it was said at the writing
+        with contextlib.suppress(OSError):  # the disk is gone, which was told at the writing
             os.close(self._descriptor)
 
     def _attach(self, event: RunBegan) -> RunBegan:
@@ -206,7 +206,7 @@ class RunWriter:
         last = self._feedback.get(event.goal_id, -THINNED)
         if event.at.steady - last < THINNED:
             return True
-        if len(self._feedback) > 1000:  # of goals that are over
+        if len(self._feedback) > 1000:  # most are of ended goals
             self._feedback.clear()
         self._feedback[event.goal_id] = event.at.steady
         return False
@@ -227,7 +227,7 @@ class RunWriter:
             told = (self._run_id, at.number, *time, node, status)
             data = encode(LAYOUTS[EVENTS], told, (type(event).__name__, to_line(event)))
             self._message(EVENTS, at, data)
-        if isinstance(event, NodeChanged):  # behind its event, which says more where there is one
+        if isinstance(event, NodeChanged):  # behind its event, which has more
             short = (at.number, *time, node, status, event.by_itself)
             self._message(TRANSITIONS, at, encode(LAYOUTS[TRANSITIONS], short))
 
@@ -281,7 +281,7 @@ def _create(path: Path) -> int:
 
 
 def _write_all(descriptor: int, data: bytes) -> None:
-    """Write all of it: a full disk takes a part first, and only then says that."""
+    """Write all of it: a full disk takes a part first, and only then reports an error."""
     view = memoryview(data)
     while view:
         view = view[os.write(descriptor, view) :]
