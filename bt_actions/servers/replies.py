@@ -100,7 +100,7 @@ class Replies:
         self.sent_to, self._fresh_since = servers, now
         self._told_of_two = self._runs_anew = True
 
-    # Told by the servers
+    # The words of the servers
 
     def weigh_answer(
         self, request: str, watch: ServerWatch, now: float, asked: float, answers: Sequence[Any]
@@ -195,7 +195,7 @@ class Replies:
             status = STATUS_EXECUTING  # one server ended the goal; only the acceptance is sure
         return Event.STATUS, status
 
-    # Told by discovery
+    # Discovery
 
     def weigh_sight(self, watch: ServerWatch, now: float) -> Told:
         """Take what discovery shows now."""

@@ -70,9 +70,9 @@ def why_not(handle: GoalHandle) -> str:
                 return f": goal {other.goal.id.hex()} of {other.name} has not ended there{told}"
         return ""  # the holder simply runs
     if any(each.goal.outstanding for each in left_near(handle)):
-        return ": what it would use still has a goal that was given up, and would run both"
+        return ": a goal on the same resources was given up, and both would run"
     if _may_overtake(handle):
-        return ": it has not answered another goal's request, and might run that one last"
+        return ": the server has not answered another goal's request, and might run that one last"
     return handle.endpoint.participant.instead(*handle.endpoint.action)
 
 

@@ -94,7 +94,7 @@ class Drain:
             if now < self._gives_up_at and any(requests):
                 self._deliver_arrived()
                 return Sleep(LOOK)
-            for each in self._waits:  # all at once, though a server's queue drops what is too much
+            for each in self._waits:  # all at once, though a server's full queue drops some
                 cancel_queue.send_now(each.endpoint, each.goal.id)
             for each in self._waits:
                 tell(each, Event.DRAIN_GAVE_UP)

@@ -25,7 +25,7 @@ Effect = Callable[[GoalHandle], None]
 """One thing to do for a goal."""
 
 
-# What happens
+# Events
 
 
 def tell(handle: GoalHandle, event: Event, detail: Any = None) -> None:
@@ -167,7 +167,7 @@ def _do_in_order(handle: GoalHandle, effects: Iterable[Effect]) -> None:
         domain.does_effects = False
 
 
-# What a goal decides
+# Commands of a goal
 
 
 def _release(handle: GoalHandle) -> None:
@@ -213,7 +213,7 @@ _COMMANDS: dict[Command, Effect] = {
 }
 
 
-# What follows from it
+# Effects of a step
 
 
 def report(handle: GoalHandle) -> None:
@@ -269,7 +269,7 @@ def _put_on_record(handle: GoalHandle) -> None:
     endpoint.host.record.enter(goal.id, entry)
 
 
-# Which goals are where
+# The places of goals
 
 
 def take_in(endpoint: Endpoint, handle: GoalHandle) -> None:

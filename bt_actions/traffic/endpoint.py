@@ -32,7 +32,7 @@ class ActionEndpoint(Endpoint):
     def __repr__(self) -> str:
         return f"<ActionEndpoint {self.name}, {len(self.goals)} goals>"
 
-    # What the server says (transport.Listener)
+    # Words of the server, for the transport
 
     def answer_came(
         self, request: Request, goal_id: bytes, asked: float, answers: tuple[Any, ...]
@@ -97,7 +97,7 @@ class ActionEndpoint(Endpoint):
                 route.glance(self)
         return handle
 
-    # Time passes (scheduler.Scheduled)
+    # Passing time, for the scheduler
 
     def run_due(self, now: float) -> float:
         """Look, send and apply deadlines as far as due; return the seconds until more is due."""

@@ -33,7 +33,7 @@ LOOK_WHILE_RUNNING = 0.2
 """Seconds between two looks at a server on which goals are open."""
 
 
-# What is seen, asked and heard
+# Sight, questions and answers
 
 
 def is_absent(endpoint: Endpoint, now: float) -> bool:
@@ -78,7 +78,7 @@ def deliver_arrived(endpoint: Endpoint) -> None:
     cancel_queue.send_more(endpoint, endpoint.host.steady())
 
 
-# Does the server hear us?
+# Whether the server hears us
 
 
 def holds_back(endpoint: Endpoint, now: float) -> bool:
@@ -118,7 +118,7 @@ def _reachability(endpoint: Endpoint, now: float) -> Reachability:
     return reachability
 
 
-# Is there another way?
+# Another way
 
 
 def misses(endpoint: Endpoint) -> bool:
@@ -131,7 +131,7 @@ def misses(endpoint: Endpoint) -> bool:
     if endpoint.orphaned or is_new or not endpoint.goals:
         return False
     if endpoint.users <= 0 and all(handle.goal.lost for handle in endpoint.handles):
-        return False  # nobody here wants it; it is remembered, as what is parked is
+        return False  # nobody here wants the server; its goals are kept, as parked ones are
     known = endpoint.domain.ever_lost_sight or endpoint.action in endpoint.domain.known
     running = (State.SENDING, State.EXECUTING, State.REPLACED)
     still = all(handle.goal.state not in running for handle in endpoint.handles)

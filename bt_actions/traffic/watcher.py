@@ -71,7 +71,7 @@ def recent_state(endpoint: Endpoint, now: float) -> Server:
     A server that has taken another's place since then is seen right after the send.
     """
     is_known = now - endpoint.looked_at < LOOK_AT_REST and _is_alone(endpoint)
-    is_known &= endpoint.action not in endpoint.domain.lost  # what was left is canceled first
+    is_known &= endpoint.action not in endpoint.domain.lost  # left goals are canceled first
     if is_known and endpoint.participant.alive() and not _counts_others(endpoint):
         if _rests(endpoint):
             endpoint.look_at = max(endpoint.look_at, now + LOOK_WHILE_RUNNING)
