@@ -1,8 +1,8 @@
-"""Trees tested in virtual time, without ROS: a network, simulated servers, a runner.
+"""Tests of trees in virtual time, without ROS: a network, simulated servers, a runner.
 
-What a tree sends here is decided by the same code as on a robot; only time and messages are played,
-so that a minute takes a tenth of a second and each run is the same. The servers are those of
-`bt_actions.simulation`, with all their faults: give them a VirtualNetwork in place of a node.
+The same code decides as on a robot. Only time and messages are played, so that a minute takes a
+tenth of a second and each run is the same. The servers are those of `bt_actions.simulation`, with
+all their faults: give them a VirtualNetwork in place of a node.
 """
 
 from __future__ import annotations

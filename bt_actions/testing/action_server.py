@@ -1,7 +1,7 @@
 """The server side of an action on the virtual network: the states of its goals, as rcl has them.
 
-The Wire of simulation/platform.py. It carries messages; what becomes of a goal decides the server
-that it was made for.
+This is the Wire of simulation/platform.py. It carries messages; the server behind it decides the
+course of a goal.
 """
 
 from __future__ import annotations

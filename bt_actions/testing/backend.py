@@ -1,6 +1,6 @@
-"""What a tree is set up with in virtual time: the Backend of traffic/backend.py.
+"""The Backend of traffic/backend.py in virtual time, for the setup of a tree.
 
-Topics and services are those of the network; nothing on it is ever undiscovered.
+Topics and services are those of the network; nothing there is ever undiscovered.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ class VirtualBackend:
     def __init__(
         self, network: VirtualNetwork, *, seed: int = 0, host: VirtualHost | None = None
     ) -> None:
-        """Goal ids, and the pauses before retries, depend on `seed` and the number on the network.
+        """Make a backend; goal ids and pauses depend on `seed` and the number on the network.
 
         `host` is that of another backend, where both stand for nodes of one process.
         """
         self.network = network
-        seed += next(network.numbers) << 64  # what two make from one seed differs
+        seed += next(network.numbers) << 64  # two backends of one seed differ
         self.host = host or VirtualHost(network.timeline, network.log, seed)
         self.participant = VirtualParticipant(network, "tree", network.namespace)
         self.traffic = Traffic(self.host, self.participant)
@@ -39,7 +39,7 @@ class VirtualBackend:
         self.randomness = self.host.randomness
 
     def stamp(self) -> int:
-        """This moment in nanoseconds."""
+        """Return this moment in nanoseconds."""
         return int(self.network.now() * 1e9)
 
     def service(self, service_type: type, name: str) -> VirtualService:
@@ -58,7 +58,7 @@ class VirtualBackend:
 
 
 class _Connection:
-    """What all have in common: whoever is there was discovered long ago."""
+    """The common part of connections, whose other ends are discovered from the beginning."""
 
     _theirs = "what is there"
     _nobody = ": nobody offers it"
@@ -69,7 +69,7 @@ class _Connection:
         self._type = its_type
 
     def may_come(self) -> float:
-        """Say that nobody else may."""
+        """Return 0: nobody else may come."""
         return 0.0
 
     def why_nobody(self) -> str:
@@ -84,7 +84,7 @@ class _Connection:
         return self._nobody + elsewhere(self.name, kind, known)
 
     def _there(self) -> dict[str, set[type]]:
-        """Return the types of what may be at the other end, by its full name."""
+        """Return the types at the possible other ends, by full name."""
         raise NotImplementedError
 
 
@@ -96,7 +96,7 @@ class VirtualService(_Connection):
         return self._network.service(self._type, self.name) is not None
 
     def call(self, request: Any) -> Future[Any]:
-        """Begin a call. What answers it raises TypeError where it returns no response."""
+        """Begin a call. Its answer raises TypeError where the service returns no response."""
         call, wake = Future[Any](), waker()
         if served := self._network.service(self._type, self.name):
             answer, takes = served
@@ -109,7 +109,7 @@ class VirtualService(_Connection):
                         f"the service {self.name} was answered with {told(response)}: what plays "
                         f"it has to return an instance of {short_name(expected.Response)}"
                     )
-                response = copy.deepcopy(response)  # whoever answers may change it for the next one
+                response = copy.deepcopy(response)  # the service may change it for the next answer
                 self._network.timeline.call_in(takes, lambda: self._network.soon(arrive, response))
 
             def arrive(response: Any) -> None:
@@ -121,14 +121,14 @@ class VirtualService(_Connection):
         return call
 
     def close(self) -> None:
-        """Have nothing to let go of."""
+        """Do nothing: a client holds nothing."""
 
     def _there(self) -> dict[str, set[type]]:
         return {name: {its_type} for name, (its_type, *_) in self._network.services.items()}
 
 
 class VirtualSubscription(_Connection):
-    """One topic, listened to."""
+    """One topic, with a reader here."""
 
     _theirs = "what is published there"
     _nobody = ": nobody publishes on it"
@@ -159,7 +159,7 @@ class VirtualSubscription(_Connection):
 
 
 class VirtualSpeaker(_Connection):
-    """One topic, spoken on by a leaf."""
+    """One topic, with a leaf as its writer."""
 
     _theirs = "what is asked for there"
     _nobody = ""

@@ -1,7 +1,7 @@
-"""What goals that run in virtual time have in common: the Host of traffic/state.py.
+"""The Host of traffic/state.py in virtual time, for the goals of one played process.
 
-One for each process that is played. All happens on one thread, so nothing has to be guarded; ids
-come from a seed, and a mistake of ours is raised where it happens.
+All happens on one thread, so nothing has to be guarded; ids come from a seed, and a bug of ours
+raises where it happens.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from bt_actions.traffic.state import Domain, Record, Trace
 
 
 class VirtualHost:
-    """See the head of this file."""
+    """The host of one played process."""
 
     def __init__(self, timeline: Timeline, log: Lines, seed: int = 0) -> None:
         self.lock = nullcontext()
@@ -47,11 +47,11 @@ class VirtualHost:
         return self.randomness.randbytes(16)
 
     def wait(self, timeout: float) -> bool:
-        """Let the next thing happen that is due within `timeout` seconds."""
+        """Let the next event happen that is due within `timeout` seconds."""
         return self._timeline.advance(self._timeline.now + timeout)
 
     def notify_all(self) -> None:
-        """Wake nobody: who waits looks again after each thing that happens."""
+        """Do nothing: a waiting drain looks again after each event."""
 
     # The alarm
 

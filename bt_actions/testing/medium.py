@@ -1,6 +1,6 @@
-"""Who is on the virtual network, and how messages between them travel.
+"""The parties on the virtual network, and the way of messages between them.
 
-Everything sent arrives `LATENCY` later, in order. It knows neither what is said nor who says it.
+Each message arrives `LATENCY` later, in order. The medium knows neither content nor sender.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class VirtualRequest:
 
 
 class Party(Protocol):
-    """Who takes part in an action."""
+    """A party in an action."""
 
     @property
     def name(self) -> str:
@@ -35,7 +35,7 @@ class Party(Protocol):
 
     @property
     def action_type(self) -> Any:
-        """and its type: who has another one is not there for this one."""
+        """and its type: a party with another type is not there for this one."""
 
 
 class Served(Party, Protocol):
@@ -43,7 +43,7 @@ class Served(Party, Protocol):
 
     @property
     def gid(self) -> bytes:
-        """What sets it apart from all others."""
+        """The id that tells it from all others."""
 
     @property
     def statuses(self) -> dict[bytes, int]:
@@ -54,7 +54,7 @@ class Served(Party, Protocol):
 
 
 class Client(Party, Protocol):
-    """Who sends requests, and hears what servers publish."""
+    """The sender of requests, which hears what servers publish."""
 
     def hear_feedback(self, goal_id: bytes, feedback: Any) -> None:
         """Take feedback."""
@@ -64,7 +64,7 @@ class Client(Party, Protocol):
 
 
 class Medium:
-    """Who is there, and what arrives when, by `timeline`."""
+    """The parties that are there, and the arrivals of messages on `timeline`."""
 
     def __init__(self, timeline: Timeline) -> None:
         self.timeline = timeline
@@ -79,13 +79,13 @@ class Medium:
         self.timeline.call_at(self._arrived_at, partial(work, *arguments))
 
     def arrive(self) -> None:
-        """Let time pass until all has arrived that was sent by now, and not what answers that."""
+        """Let time pass until all messages sent by now have arrived, but not their answers."""
         until = self._arrived_at
         while self.timeline.advance(until):
             pass
 
     def new_gid(self) -> bytes:
-        """Return what sets a server apart."""
+        """Return an id that no other server has."""
         self._gids += 1
         return self._gids.to_bytes(16, "big")
 
@@ -99,7 +99,7 @@ class Medium:
         self._servers.append(server)
 
     def remove_server(self, server: Served) -> None:
-        """Show it no more."""
+        """Show the server no more."""
         if server in self._servers:
             self._servers.remove(server)
 
@@ -108,14 +108,14 @@ class Medium:
         return [server for server in self._servers if _match(server, client)]
 
     def add_client(self, client: Client) -> None:
-        """Have it hear what servers publish; and how their goals stand now."""
+        """Have the client hear what servers publish, and the present statuses of their goals."""
         self._clients.append(client)
         for server in self.servers_of(client):
             if server.statuses:
                 self.soon(client.hear_status, server.statuses)
 
     def remove_client(self, client: Client) -> None:
-        """Have it hear nothing any more."""
+        """Have the client hear nothing any more."""
         self._clients.remove(client)
 
     def publish_feedback(self, server: Served, goal_id: bytes, message: Any) -> None:

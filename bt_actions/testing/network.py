@@ -1,6 +1,6 @@
-"""A network in virtual time: what simulated servers stand on, as on an rclpy node, and trees.
+"""A network in virtual time, for trees and simulated servers in place of an rclpy node.
 
-The Platform of simulation/platform.py, with topics and services. It decides nothing.
+This is the Platform of simulation/platform.py, with topics and services. It decides nothing.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from bt_actions.testing.medium import Medium
 from bt_actions.testing.timeline import Alarm, Timeline
 
 Subscription = tuple[type, Callable[[Any], None]]
-"""The type of the messages, and what takes them."""
+"""The type of the messages, and the function that takes them."""
 
 
 class Lines:
-    """A log that keeps what it is told."""
+    """A log that keeps its lines."""
 
     def __init__(self) -> None:
         self.lines: list[tuple[str, str]] = []
-        """Level and text of each, in order."""
+        """The level and the text of each line, in order."""
 
     def add(self, level: str, text: str) -> None:
-        """Take a line of this level."""
+        """Add a line of this level."""
         self.lines.append((level, text))
 
     def info(self, text: str) -> None:
@@ -42,30 +42,31 @@ class Lines:
         self.add("error", text)
 
     def flush(self) -> None:
-        """Have nothing to do."""
+        """Do nothing: no line waits."""
 
 
 class VirtualNetwork(Medium):
-    """What participants and simulated servers are on; `timeline` is its time."""
+    """The network of participants and simulated servers; `timeline` is its time."""
 
     def __init__(self, namespace: str = "/") -> None:
-        """`namespace` is that of the servers on it, and of trees that are run on it."""
+        """Make a network; `namespace` is that of the servers on it, and of trees that run on it."""
         super().__init__(Timeline())
         self.log = Lines()
         self.numbers = itertools.count()
-        """Those of its participants."""
+        """The numbers of its participants."""
         self.namespace = f"/{namespace.strip('/')}"
         self.topics: dict[str, Topic] = {}
-        """What is known of each, by its full name."""
+        """The topics by full name."""
         self._publishers: dict[tuple[str, type, bool], VirtualPublisher] = {}
-        """Those behind `publish`."""
+        """The publishers behind `publish`."""
         self.services: dict[str, tuple[type, Callable[[Any], Any], float]] = {}
-        """By its full name, each service's type, how it answers, and how long that takes."""
+        """The type of each service, its function, and the seconds that an answer takes, by full
+        name."""
 
     def __repr__(self) -> str:
         return f"<VirtualNetwork {', '.join(self.actions) or 'without servers'}, {self.timeline!r}>"
 
-    # What simulated servers stand on
+    # The platform of simulated servers
 
     def now(self) -> float:
         """Return the virtual time."""
@@ -91,7 +92,7 @@ class VirtualNetwork(Medium):
     # Topics
 
     def topic(self, name: str) -> Topic:
-        """Return what is known of a topic."""
+        """Return a topic, with its publishers and listeners."""
         return self.topics.setdefault(self.expand(name), Topic())
 
     def subscribe(
@@ -104,7 +105,7 @@ class VirtualNetwork(Medium):
     ) -> Subscription:
         """Have `take` called with each message of this type.
 
-        With `latched` also with the latest one that each latched publisher has published before.
+        `latched` adds the latest message of each latched publisher from before.
         """
         message_type = interface(message_type, "msg")
         subscription, its = (message_type, take), self.topic(topic)
@@ -115,9 +116,9 @@ class VirtualNetwork(Medium):
         return subscription
 
     def publish(self, topic: str, message: Any, *, latched: bool = False) -> None:
-        """Publish a message, by a publisher of its type that stays; it sets no stamp.
+        """Publish a message, by a publisher of its type that stays; no stamp is set.
 
-        `latched` messages are brought to later subscriptions that are latched, too.
+        `latched` messages also reach later subscriptions that are latched.
         """
         key = self.expand(topic), type(message), latched
         if not _is_message(message):
@@ -140,13 +141,13 @@ class VirtualNetwork(Medium):
         self.services[self.expand(name)] = (interface(service_type, "srv"), answer, takes)
 
     def service(self, service_type: type, name: str) -> tuple[Callable[[Any], Any], float] | None:
-        """Return how a service answers, and how long that takes; None where there is none."""
+        """Return the function of a service, and its seconds; None where there is none."""
         found = self.services.get(self.expand(name))
         return found[1:] if found is not None and found[0] is service_type else None
 
 
 class Topic:
-    """Who publishes on a topic, and who listens to it."""
+    """The publishers and the listeners of a topic."""
 
     def __init__(self) -> None:
         self.publishers: list[VirtualPublisher] = []
@@ -154,22 +155,22 @@ class Topic:
 
     @property
     def published(self) -> set[type]:
-        """The types of what is published."""
+        """The types of published messages."""
         return {each.message_type for each in self.publishers}
 
     @property
     def listened(self) -> set[type]:
-        """The types of what is listened to."""
+        """The types of awaited messages."""
         return {each for each, _ in self.subscriptions}
 
     def bring(self, subscription: Subscription, message: Any) -> None:
-        """Give a message that arrives to who still listens."""
+        """Give an arriving message to its subscription, if that still listens."""
         if subscription in self.subscriptions:
             subscription[1](message)
 
 
 class VirtualPublisher:
-    """Publishes messages of one type on a topic, from when it was made."""
+    """A publisher of messages of one type on a topic."""
 
     def __init__(
         self,
@@ -180,11 +181,11 @@ class VirtualPublisher:
         latched: bool,
         stamps: bool = False,
     ) -> None:
-        """Be there; `stamps`: the headers of messages get the virtual time."""
+        """Appear on the topic; `stamps` sets the headers of messages to the virtual time."""
         self.message_type: Any = interface(message_type, "msg")
         self.topic = network.expand(topic)
         self.kept: Any = None
-        """The latest message, where it is `latched`: later subscriptions are given that."""
+        """The latest message, where it is `latched`: later subscriptions get it."""
         self._network = network
         self._latched = latched
         self._stamps = stamps
@@ -200,7 +201,7 @@ class VirtualPublisher:
         if not isinstance(message, self.message_type):
             kind = interface_name(self.message_type)
             raise TypeError(f"{self.topic} was given {told(message)}, and is a topic of {kind}")
-        message = copy.deepcopy(message)  # whoever publishes may change it before it arrives
+        message = copy.deepcopy(message)  # the caller may change it before it arrives
         if self._stamps and hasattr(message, "header"):
             nanoseconds = int(self._network.now() * 1e9)
             message.header.stamp.sec, message.header.stamp.nanosec = divmod(nanoseconds, 10**9)
@@ -218,7 +219,7 @@ class VirtualPublisher:
 
 
 class VirtualTimer:
-    """Rings once."""
+    """A timer that rings once."""
 
     def __init__(self, timeline: Timeline, ring: Callable[[], None]) -> None:
         self._timeline = timeline
@@ -227,7 +228,7 @@ class VirtualTimer:
 
     @property
     def is_off(self) -> bool:
-        """Whether it will not ring."""
+        """Whether the timer will not ring."""
         return self._alarm is None
 
     def set(self, when: float | None) -> None:
@@ -250,7 +251,7 @@ def _is_message(value: object) -> bool:
 
 
 def told(value: object) -> str:
-    """Return what was given in place of a message, for an error."""
+    """Return the words for an object in place of a message, for an error."""
     if isinstance(value, type):
         return f"the class {short_name(value)}"
     return f"a {short_name(type(value))}" if _is_message(value) else reprlib.repr(value)

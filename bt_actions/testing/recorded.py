@@ -1,4 +1,4 @@
-"""Simulated servers that do what the servers of a recorded run did."""
+"""Simulated servers that act as the servers of a recorded run did."""
 
 from __future__ import annotations
 
@@ -36,5 +36,5 @@ def serve_as_recorded(
 
 
 def _events(run: str) -> Iterator[Event]:
-    """The events that are recorded, without the states that stand in place of missing ones."""
+    """Yield the recorded events, without the states that stand in place of missing ones."""
     return (each for each in Recording(find(run)).items() if not isinstance(each, State))

@@ -1,6 +1,6 @@
-"""Runs a tree in virtual time, on the loop of running/loop.py: to its end, or step by step.
+"""The runner of a tree in virtual time, on the loop of running/loop.py: to its end, or in steps.
 
-No thread, no wait: between two steps the time jumps to what happens next.
+No thread, no wait: between two steps the time jumps to the next event.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from bt_actions.goals.unaccounted import GoalReport
 
 LONGEST = 3600.0
-"""Virtual seconds that a run may take where nothing else is said."""
+"""Virtual seconds that a run may take without a timeout of its own."""
 
 
 class VirtualRunner:
-    """Runs one tree on a virtual network."""
+    """A runner of one tree on a virtual network."""
 
     def __init__(
         self,
@@ -51,11 +51,11 @@ class VirtualRunner:
         self.network = network or VirtualNetwork()
         self.backend = VirtualBackend(self.network, seed=seed)
         self.events: list[Event] = []
-        """What happened in all runs; times are virtual."""
+        """The events of all runs; times are virtual."""
         self.state = State()
-        """Where the latest run stands, or how it ended."""
+        """The state of the latest run."""
         self.outcomes: list[tuple[str, Outcome]] = []
-        """Of each attempt that is over, in that order: the leaf, and what it says of it."""
+        """The leaf and its outcome for each attempt that is over, in order."""
         self._woken = self._goes_on = False
         self._status: Status | None = None
         """None before the first run."""
@@ -79,9 +79,9 @@ class VirtualRunner:
 
     @property
     def unaccounted(self) -> list[GoalReport]:
-        """Goals that may still be running, as nobody knows their end.
+        """The goals whose end is UNKNOWN, and which may still be running.
 
-        Raises RuntimeError while a run goes on, as its goals have to end yet.
+        Raises RuntimeError while a run goes on, as its goals have yet to end.
         """
         if self._goes_on:
             raise RuntimeError("the run goes on: let it end first, with advance() or run()")
@@ -94,9 +94,9 @@ class VirtualRunner:
     def run(self, timeout: float = LONGEST) -> Status:
         """Run the tree to its end, and drain its goals; return its status.
 
-        What it has sent has arrived then. A run that `start` began goes on, with its own timeout.
-        Raises TimeoutError when it has not ended after so many virtual seconds, and TreeError when
-        a behaviour raised.
+        The messages that the tree has sent have arrived then. A run that `start` began goes on,
+        with its own timeout. Raises TimeoutError when the run has not ended after so many virtual
+        seconds, and TreeError when a behaviour raised.
         """
         if not self._goes_on:
             self.start(timeout)
@@ -113,11 +113,11 @@ class VirtualRunner:
         self._status, self._next = Status.INVALID, self.now
 
     def advance(self, seconds: float) -> Status | None:
-        """Let so much time pass; return the tree's status if it has ended by then.
+        """Let so much time pass; return the tree's status if the tree has ended by then.
 
-        It returns when the tree has ended and what that has sent has arrived; after that, time
-        passes without it. INVALID means that it was interrupted. Raises what `run` raises, and
-        RuntimeError before the first `start`.
+        Returns when the tree has ended and its messages have arrived; after that, time passes
+        without the tree. INVALID means an interrupt. Raises what `run` raises, and RuntimeError
+        before the first `start`.
         """
         if self._status is None:
             raise RuntimeError("no run was begun: call start() before advance()")
@@ -138,7 +138,7 @@ class VirtualRunner:
         return self._status
 
     def _step(self) -> Sleep | Done[Status]:
-        """Let the loop do what is due; at the end of the run, let arrive what it has sent."""
+        """Let the loop do what is due; at the end of the run, let its messages arrive."""
         step: Sleep | Done[Status] | None = None
         try:
             step = self._loop.step(self.now)
@@ -152,7 +152,7 @@ class VirtualRunner:
         self._loop.interrupt(self.now)
 
     def shutdown(self) -> None:
-        """Shut the leaves down, and see to what they left, as a program that ends does."""
+        """Shut the leaves down, and drain their goals, as a program that ends does."""
         self._loop.shutdown()
         self.network.arrive()
         self.backend.traffic.destroy()

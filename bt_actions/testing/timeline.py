@@ -1,7 +1,7 @@
-"""Virtual time: what is to happen and when, in one queue of (time, order).
+"""Virtual time: events in one queue of (time, order).
 
-Time passes only from one entry to the next; entries of one moment happen in the order in which
-they were made. No thread and no real clock, so a run is the same each time.
+Time passes only from one entry to the next; entries of one moment happen in the order in which they
+were made. No thread and no real clock, so a run is the same each time.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ class Alarm:
         self.work: Callable[[], object] | None = work
 
     def cancel(self) -> None:
-        """Let nothing happen."""
+        """Call the entry off."""
         self.work = None
 
 
@@ -37,7 +37,7 @@ class Timeline:
         return f"<Timeline at {self.now:g} s, {len(self._queue)} to come>"
 
     def call_at(self, when: float, work: Callable[[], object]) -> Alarm:
-        """Have `work` called at `when`, or, where that is past, as soon as may be."""
+        """Have `work` called at `when`, or at once where that is past."""
         alarm = Alarm(work)
         heapq.heappush(self._queue, (max(when, self.now), next(self._order), alarm))
         return alarm
@@ -47,9 +47,9 @@ class Timeline:
         return self.call_at(self.now + seconds, work)
 
     def advance(self, until: float) -> bool:
-        """Let the next thing happen if it is due by `until`; else it is `until`.
+        """Let the next event happen if it is due by `until`; otherwise set the time to `until`.
 
-        Returns whether something was due.
+        Returns whether an event was due.
         """
         while self._queue and self._queue[0][0] <= until:
             when, _, alarm = heapq.heappop(self._queue)

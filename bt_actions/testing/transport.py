@@ -1,7 +1,7 @@
 """One action as one participant of the virtual network sees it, and the participant.
 
-The ActionTransport and the Participant of traffic/transport.py. What is sent arrives a little later
-and in order; what arrives is delivered at once, so a `deliver_arrived` finds nothing.
+These are the ActionTransport and the Participant of the seam. A sent message arrives a little
+later, in order, and is delivered at once, so a `deliver_arrived` finds nothing.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class _Question:
 
 
 class VirtualTransport:
-    """Requests out, answers to its listener."""
+    """The transport of one action: requests out, answers to its listener."""
 
     def __init__(
         self,
@@ -91,7 +91,7 @@ class VirtualTransport:
     # Answers
 
     def deliver_arrived(self) -> None:
-        """Find nothing: what has arrived was delivered."""
+        """Do nothing: all arrived messages were delivered."""
 
     def _answered(self, question: _Question, answer: Any) -> None:
         if self.closed or not (question in self._questions or question in self._past):
@@ -112,7 +112,7 @@ class VirtualTransport:
             self._listener.statuses_came(statuses)
             self._listener.all_delivered()
 
-    # What is in sight
+    # Sight
 
     def _shown(self) -> list[Served]:
         return self._medium.servers_of(self)
@@ -135,7 +135,7 @@ class VirtualTransport:
 
 
 class VirtualParticipant:
-    """A node on the virtual network; it has discovered long ago who is there."""
+    """A node on the virtual network, which has discovered all parties from the beginning."""
 
     seen_since = LONG_AGO
     long_stalls = 0
@@ -154,7 +154,7 @@ class VirtualParticipant:
         return self._alive
 
     def close(self) -> None:
-        """Be gone, as a node that was destroyed."""
+        """Leave the network, as a destroyed node does."""
         self._alive = False
 
     def shut_down(self) -> bool:
@@ -183,8 +183,8 @@ class VirtualParticipant:
         return did_you_mean(name, served)
 
     def unheard(self) -> str:
-        """Nothing: here nobody is another user."""
+        """Return "": no process of another user is here."""
         return ""
 
     def seek(self, endpoint: Endpoint) -> None:
-        """Look for nothing: a second participant would see the same."""
+        """Do nothing: a second participant would see the same."""
