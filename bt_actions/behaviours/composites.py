@@ -1,7 +1,7 @@
 """Composites beyond those of py_trees: a retry that recovers, a choice, a pipeline, turns.
 
-They are composites of py_trees, and work in any tree. `work` ticks one child after another: it
-yields what their ticks yield, and returns the status that follows.
+These composites are py_trees' own kind, and work in any tree. `work` ticks one child after another:
+the generator yields what their ticks yield, and returns the status that follows.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 class Connected(Generic[T]):
-    """The part of a behaviour that needs a node: it has one thing of its own there."""
+    """The part of a behaviour that needs a node, with one connection of its own there."""
 
     name: str
     _backend: Backend | None = None
@@ -34,17 +34,17 @@ class Connected(Generic[T]):
             self._own, self._backend = self._make(backend), backend
 
     def _make(self, backend: Backend) -> T:
-        """Make the thing of its own on the node."""
+        """Make the connection on the node."""
         raise NotImplementedError
 
     def _connection(self) -> tuple[Backend, T]:
-        """Return the node, and the thing there."""
+        """Return the node, and the connection there."""
         if self._backend is None or self._own is None:
             raise RuntimeError(f"{self.name}: not set up; call setup(node=node) before ticking")
         return self._backend, self._own
 
     def _let_go(self) -> None:
-        """Close the thing, and forget the node."""
+        """Close the connection, and forget the node."""
         if self._own is not None:
             self._own.close()
         self._own = self._backend = None

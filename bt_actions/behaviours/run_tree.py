@@ -22,8 +22,8 @@ from bt_actions.traffic.backend import Backend
 from bt_actions.traffic.state import GoalHandle
 
 CANCEL = 15.0
-"""Seconds for a canceled run to end: it sees its own goals to their ends first, within 5 s each
-where their trees say nothing else."""
+"""Seconds for a canceled run to end. The run sees its own goals to their ends first, within 5 s
+each where their trees say nothing else."""
 
 
 class RunTree(ActionBehaviour):

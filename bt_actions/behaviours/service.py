@@ -19,7 +19,7 @@ from bt_actions.traffic.backend import Backend, Call, Service
 class CallService(Connected[Service], Limited):
     """A leaf that calls a service once, and again as `retry` says.
 
-    A call without an answer in time may have been carried out all the same: it is tried again only
+    A call without an answer in time may have been carried out all the same, and is tried again only
     where `retry` asks for that.
 
     Args:

@@ -1,4 +1,4 @@
-"""Leaves and values with topics: they listen, or publish."""
+"""Leaves and values with topics, for listening and publishing."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Events without the values that a robot moved by: for readers who may know the story alone.
 
-What stays is which node did what, when, and with which outcome. Goals, results, feedback,
+The deeds of each node stay, with time and outcome. Goals, results, feedback,
 variables, items, inputs and outputs go, and of each text the part that may hold values: see `said`.
 Of nodes' messages only the outcomes of actions stay, by their names: a user's leaf may say
 anything.
@@ -33,7 +33,8 @@ from bt_actions.goals.policy import Outcome
 
 _OUTCOMES = frozenset(each.value for each in Outcome)
 _OF_THE_LEAF = (Outcome.UNEXPECTED_RESULT, Outcome.INVALID_GOAL)
-"""Outcomes whose reason the leaf's own expressions give: it may begin with a value."""
+"""Outcomes whose reason the leaf's own expressions give, so that the reason may begin with a
+value."""
 _VALUE = re.compile(r"\{|: |; ")
 """The beginnings of a value in a text: an action's `explain` follows a semicolon."""
 _RAISED = re.compile(r".*?: (?:tick|setup) raised \w+")

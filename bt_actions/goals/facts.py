@@ -251,4 +251,4 @@ def leads_to(*to: State) -> Callable[[Does], Step]:
 
 @leads_to()
 def drop(goal: Facts) -> None:
-    """Drop the event: it came too late, or twice, to mean anything."""
+    """Drop the event, which came too late, or twice, to mean anything."""

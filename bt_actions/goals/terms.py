@@ -11,7 +11,7 @@ from typing import NamedTuple
 from bt_actions.goals.policy import End, Outcome
 
 NEVER = float("-inf")
-"""A moment before every moment: it has not happened yet."""
+"""A moment before every moment, for an event that has not happened yet."""
 
 
 class Now(NamedTuple):

@@ -10,7 +10,7 @@ from bt_actions.goals.policy import Outcome
 
 @dataclass(frozen=True, slots=True)
 class GoalReport:
-    """A goal that is not accounted for: it may still be running."""
+    """A goal that is not accounted for, and may still be running."""
 
     name: str
     server: str

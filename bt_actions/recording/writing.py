@@ -127,7 +127,7 @@ class RunWriter:
         self._message(HEARTBEAT, at, encode(LAYOUTS[HEARTBEAT], (at.number, *stamp(ros), tick)))
 
     def flush(self) -> None:
-        """Write the taken events to the kernel; those that do not fit are taken back."""
+        """Write the taken events to the kernel; events without room are taken back."""
         data = self._buffer.getvalue()
         self._buffer.seek(0)
         self._buffer.truncate()

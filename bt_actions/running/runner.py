@@ -306,7 +306,7 @@ class TreeRunner:
     def shutdown(self) -> None:
         """End a run, and shut down the tree and all that was made here.
 
-        What runners share goes with the last of them: objects on their node stay until then.
+        The common parts of runners go with the last of them: objects on their node stay until then.
         Returns at once where another thread shuts down; what an exception cuts short waits no
         longer. Raises RuntimeError on a thread of an executor that is spun here, and within the
         run.

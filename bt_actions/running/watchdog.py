@@ -1,6 +1,6 @@
 """The watchdog of a run, on the alarm's thread.
 
-It sees a tick that lasts, or that was to be the last.
+It sees a tick that lasts, or the end of a run in vain.
 
 While a behaviour does not return from its tick, no other code can stop the tree, or tell its state.
 The watchdog is run beside the endpoints, and has no thread of its own.

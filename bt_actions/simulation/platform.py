@@ -48,7 +48,7 @@ class RequestHandler(Protocol):
 
 
 class Wire(Protocol):
-    """The server side of an action: it knows the state of each goal, and carries messages."""
+    """The server side of an action, with the state of each goal, for messages both ways."""
 
     def answer_soon(self, request: Request, *, silent: bool = False) -> None:
         """Answer a kept request; `silent` accepts a goal without telling its client."""

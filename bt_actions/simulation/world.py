@@ -1,7 +1,7 @@
 """One robot, one part, and the stations between which the part is carried. No ROS, no clock.
 
-The part moves only in the gripper: it is picked when the fingers close on it, goes where the robot
-goes, and lies where the fingers let it go.
+The part moves only in the gripper. The fingers pick the part when they close on it, carry it with
+the robot, and leave it where they open.
 """
 
 from __future__ import annotations

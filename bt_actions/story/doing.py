@@ -1,7 +1,7 @@
 """The one wording of a running node's work: its time, its limit, and the rule of that limit.
 
 A deadline that stands still, as its tree is paused or this process was stopped, is not known here,
-and neither is a ROS clock that runs faster: such a deadline falls due at another time than is said.
+and neither is a ROS clock that runs faster. Such a deadline falls due at another time than told.
 """
 
 from __future__ import annotations

@@ -281,7 +281,7 @@ class State:
         return found[:2]
 
     def _settle(self, child: int, by: int) -> None:
-        """Take failures at or below `child` as dealt with: they did not make `by` fail."""
+        """Take failures at or below `child` as dealt with, as they did not make `by` fail."""
         story = self.nodes[child]
         if story.pending:
             self._deal_with(story.pending, by)

@@ -82,7 +82,7 @@ def deliver_arrived(endpoint: Endpoint) -> None:
 
 
 def holds_back(endpoint: Endpoint, now: float) -> bool:
-    """Return whether to send nothing though a server is in sight: it may not hear us, or be two.
+    """Return whether to send nothing though a server is in sight: the server may be deaf, or two.
 
     A new participant may not have discovered the second of two servers yet. The first one may be
     the wrong one, or both robots may move.
@@ -124,7 +124,7 @@ def _reachability(endpoint: Endpoint, now: float) -> Reachability:
 def misses(endpoint: Endpoint) -> bool:
     """Return whether a wanted server may be there, though it is not shown whole, or is silent.
 
-    Goals under way come first: what runs on an absent server counts as lost within a second.
+    Goals under way come first: a goal on an absent server counts as lost within a second.
     """
     now = endpoint.host.steady()
     is_new = now - endpoint.participant.seen_since < TOO_NEW

@@ -1,4 +1,4 @@
-"""The scheduler of endpoints with open goals: they are run when due, ticks or not.
+"""The scheduler of endpoints with open goals, which are run when due, ticks or not.
 
 The scheduler says when its owner is to run it (`wakes_at`): the alarm thread of ros/, or a loop in
 virtual time, sleeps until then. Its sleeps are short, so that a stall of the process is noticed; a

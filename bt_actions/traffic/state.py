@@ -349,7 +349,7 @@ class GoalHandle:
     feedback: deque[Any] = field(default_factory=lambda: deque(maxlen=FEEDBACK_KEPT))
     replies: Replies = field(init=False)
     end_logged: End | None = None
-    """The end that the log knows: it tells an UNKNOWN end, and when that becomes known."""
+    """The end that the log knows: the log tells an UNKNOWN end, and when it becomes known."""
     paused: bool = False
     """Whether the tree is paused, and the goal is not sent."""
     held_back_since: float | None = None

@@ -1,11 +1,11 @@
-"""The watcher over the server of one endpoint: it looks at discovery, asks, and tells the goals.
+"""The watcher over the server of one endpoint: looks at discovery, questions, news for the goals.
 
 The problem: a goal has to learn that its server has come, gone, or been replaced, though ROS sends
 no such event, and a look at the graph is slow. Discovery is also wrong in both directions: a dead
 server is shown until its lease runs out, and a living one may be out of sight after a stall of this
 process.
 
-The rule: the watcher decides when to look, and nothing else. It looks every 50 ms while a goal
+The rule: the watcher decides when to look, and nothing else. A look is due every 50 ms while a goal
 waits for the server or several servers are shown, every 200 ms while goals run, and once a second
 at a server that is alone and ready, as long as the cheap count of servers stays the same. At each
 look presence.py says who lives, replies.py says what that means for each goal, and only a change is

@@ -83,7 +83,7 @@ def finished(goal: Facts) -> State:
 
 @leads_to()
 def cancel_answered(goal: Facts) -> None:
-    """Take note of the answer: what counts is the goal's end, or how long the goal is denied."""
+    """Take note of the answer; the end of the goal, or the time of denials, decides."""
     goal.asking.cancel_answered(goal.detail, goal.steady)
 
 

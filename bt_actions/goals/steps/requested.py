@@ -1,4 +1,4 @@
-"""Steps of a goal that was not accepted yet: it waits for resources, for a server, for an answer.
+"""Steps of a goal that was not accepted yet, and waits for resources, a server, or an answer.
 
 An answer to a wanted goal is awaited. An unwanted goal is canceled, which asks the server as well:
 the server may have the goal, or get it yet. If the server denies the goal for long enough, the tree
