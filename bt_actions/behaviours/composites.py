@@ -232,7 +232,20 @@ class Pipeline(Working):
         return leave_out(self) if left_out == len(self.children) else Status.SUCCESS
 
 
-class InTurn(Working):
+class _Placed(Working):
+    """A composite that begins a visit with the child at its own place."""
+
+    passes_on = True
+
+    def __init__(self, name: str, children: Sequence[Behaviour]) -> None:
+        super().__init__(name, children)
+        self._next = 0
+
+    def shutdown(self) -> None:
+        self._next = 0
+
+
+class InTurn(_Placed):
     """A fallback that begins behind the child that has succeeded last.
 
     A visit tries each child once, from there to the last and on from the first. The visit begins at
@@ -243,12 +256,7 @@ class InTurn(Working):
         children: in order.
     """
 
-    passes_on = True
     in_words = "fallback, in turn"
-
-    def __init__(self, name: str, children: Sequence[Behaviour]) -> None:
-        super().__init__(name, children)
-        self._next = 0
 
     def initialise(self) -> None:
         self._tried = self._left_out = 0
@@ -272,11 +280,8 @@ class InTurn(Working):
         if new_status is Status.INVALID and self.status is Status.RUNNING:
             self._next = 0
 
-    def shutdown(self) -> None:
-        self._next = 0
 
-
-class Resume(Working):
+class Resume(_Placed):
     """A sequence that goes on, after a failure or a stop, with the child that failed or ran.
 
     Args:
@@ -284,12 +289,7 @@ class Resume(Working):
         children: in order.
     """
 
-    passes_on = True
     in_words = "sequence, resumed"
-
-    def __init__(self, name: str, children: Sequence[Behaviour]) -> None:
-        super().__init__(name, children)
-        self._next = 0
 
     def work(self) -> Work:
         while self._next < len(self.children):
@@ -299,6 +299,3 @@ class Resume(Working):
             self._next += 1
         self._next = 0
         return leave_out(self) if all(map(is_left_out, self.children)) else Status.SUCCESS
-
-    def shutdown(self) -> None:
-        self._next = 0

@@ -48,6 +48,21 @@ def suits(console: Console) -> bool:
     return console.is_terminal and not console.is_dumb_terminal
 
 
+def drawing(console: Console, *, whole: bool = False) -> Live:
+    """Begin a drawing at the bottom of a terminal; `whole` takes all of the terminal."""
+    live = Live(
+        console=console,
+        auto_refresh=False,
+        screen=whole,
+        transient=True,
+        redirect_stdout=False,
+        redirect_stderr=False,
+        vertical_overflow="crop",
+    )
+    live.start()
+    return live
+
+
 class LiveView(View):
     """Draws from the state; `finish` must be called, or the terminal keeps the drawing."""
 
@@ -65,16 +80,7 @@ class LiveView(View):
         self._stopping = False
         self._passing: list[Text] = []
         self._stderr = CaughtStderr()
-        self._live = Live(
-            console=console,
-            auto_refresh=False,
-            screen=whole,
-            transient=True,
-            redirect_stdout=False,
-            redirect_stderr=False,
-            vertical_overflow="crop",
-        )
-        self._live.start()
+        self._live = drawing(console, whole=whole)
 
     @property
     def fileno(self) -> int:

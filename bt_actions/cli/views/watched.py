@@ -9,10 +9,10 @@ import time
 from collections.abc import Iterable
 
 from rich.console import Console
-from rich.live import Live
 from rich.text import Text
 
 from bt_actions.cli.streams.writing import write
+from bt_actions.cli.views.live import drawing
 from bt_actions.recording.watching import Seen
 from bt_actions.story.doing import doing
 from bt_actions.utilities.plain_text import clean
@@ -81,15 +81,7 @@ class WatchedScreen:
         self._console, self._last = console, last
         self._is_plain = console.options.ascii_only
         self._ended: set[str] = set()
-        self._live = Live(
-            console=console,
-            auto_refresh=False,
-            transient=True,
-            redirect_stdout=False,
-            redirect_stderr=False,
-            vertical_overflow="crop",
-        )
-        self._live.start()
+        self._live = drawing(console)
 
     def show(self, runs: list[Seen]) -> None:
         """Draw how the runs stand; let those scroll by that have ended."""
