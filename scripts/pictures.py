@@ -76,7 +76,7 @@ def seen(image: str) -> list[tuple[str, str, tuple[tuple[str, str], ...]]]:
 
 
 def is_fresh(picture: Path) -> bool:
-    """Tell whether a picture shows its tree as it is drawn now."""
+    """Return whether a picture shows its tree as it is drawn now."""
     if not picture.is_file():
         return False
     image = picture.read_text(encoding="utf-8")

@@ -1,9 +1,9 @@
 """Trees written in YAML: read, checked and built. A library for editors and services, too.
 
-`findings/` says what is wrong, `yaml/` reads text, `language/` knows keys and what a kind is,
-`reading/` makes documents; above them, side by side, `checking/` and `building/`; on top of these
-`kinds/`, a file each; `formatting/` and `load.py` put them together. Importing this imports neither
-rclpy nor any message package.
+`findings/` holds what is wrong, `yaml/` reads text, `language/` knows keys and kinds, `reading/`
+makes documents. `checking/` and `building/` stand above these, side by side; `kinds/` comes next,
+with a file for each kind. `formatting/` and `load.py` put all of them together. This import loads
+neither rclpy nor any message package.
 """
 
 from importlib import import_module
@@ -64,7 +64,7 @@ __all__ = [
 ]
 
 _PLACES = ("findings", "findings.rules", "yaml.source", "reading.find", "reading.inputs", "load")
-"""Where those names are that are imported when they are asked for; the quickest ones come first."""
+"""The modules of the names that are imported on demand; the quickest modules come first."""
 
 
 def __getattr__(name: str) -> object:
@@ -76,6 +76,6 @@ def __getattr__(name: str) -> object:
 
 
 def place_of(behaviour: object) -> Place | None:
-    """Where a behaviour was written, or None for one that no document made."""
+    """Return the place where a behaviour was written, or None where no document made it."""
     place = getattr(getattr(behaviour, NODE, None), "place", None)
     return place if isinstance(place, Place) else None

@@ -1,7 +1,8 @@
 """The card of a node, as tables: its policies, its types, its inputs and outputs.
 
-Most comes from the behaviour itself, so that a node made in Python has tables as well. Plain texts:
-escaping is the page's. Never ticks, sets up or changes a tree, and never imports rclpy.
+Most lines come from the behaviour itself, so a node made in Python has tables as well. All texts
+are plain: the page escapes them. This file never ticks, sets up or changes a tree, and never
+imports rclpy.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ _OURS = ("py_trees", "bt_actions")
 _DEEPEST = 3
 """Levels of messages inside a message."""
 _MOST_LINES = 60
-"""Of one message."""
+"""Lines of one message."""
 _MOST_CHARACTERS = 300
-"""Of one value."""
+"""Characters of one value."""
 
 
 class Line(NamedTuple):
@@ -50,11 +51,11 @@ class Table(NamedTuple):
 
 
 class Card(NamedTuple):
-    """What is told of a node beside its events.Node."""
+    """What a page tells of a node beside its events.Node."""
 
     tables: tuple[Table, ...]
     yaml: str
-    """The lines that made it, without its children; "" for a node made in Python."""
+    """The lines that made the node, without its children; "" for a node made in Python."""
 
 
 def cards_of(root: Behaviour) -> list[Card]:
@@ -76,10 +77,10 @@ def cards_of(root: Behaviour) -> list[Card]:
 def _tables(
     node: Behaviour, written: TreeNode | None, document: Document | None
 ) -> Iterator[Table]:
-    """Return what `node` takes and gives, and what it does when things go wrong.
+    """Return the tables of what `node` takes and gives, and of its policies.
 
-    `written` is the node of the document, where there is one; `document` is the tree whose root
-    `node` is, or which it includes.
+    `written` is the node of the document, where there is one. `document` is the tree whose root
+    `node` is, or the tree that `node` includes.
     """
     if document is not None:
         yield from _ports(document)
@@ -98,7 +99,7 @@ def _tables(
 
 
 def _interface_of(node: Behaviour, written: TreeNode | None) -> tuple[type | str, Kind] | None:
-    """Return the interface that a node uses, for `_described`; None where it uses none."""
+    """Return the interface that a node uses, for `_described`; None where a node uses none."""
     kind: Kind
     for attribute, kind in (("action_type", "action"), ("service_type", "srv")):
         found = getattr(node, attribute, None)

@@ -1,4 +1,4 @@
-"""A node of a tree as a value, for those who show it and have no tree. No ROS."""
+"""A node of a tree as a value, for readers without the tree. No ROS."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PHASES = ("queue", "server", "accept", "result", "feedback", "cancel")
 
 
 def nodes_of(root: Behaviour) -> tuple[Node, ...]:
-    """Return what is told of each node of a tree, as a run of it would begin."""
+    """Return a value for each node of a tree, as the first event of a run has them."""
     numbers = {node: number for number, node in enumerate(in_order(root), 1)}
     return tuple(
         describe(node, number, numbers[node.parent] if node is not root and node.parent else None)
@@ -28,7 +28,7 @@ def nodes_of(root: Behaviour) -> tuple[Node, ...]:
 
 
 def describe(node: Behaviour, number: int, parent: int | None, index: int | None = None) -> Node:
-    """Return what is told of a node, which has this number, and this place among its siblings."""
+    """Return the value of a node with this number and this index among its siblings."""
     server, action = action_of(node) or ("", "")
     return Node(
         number,
@@ -59,7 +59,7 @@ def _settings(node: Behaviour) -> dict[str, Value]:
 
 @lru_cache(maxsize=256)
 def _constants(action: Any) -> dict[str, Value]:
-    """The constants of goal, result and feedback, by field and number."""
+    """Return the constants of goal, result and feedback, by field and number."""
     found: dict[str, Value] = {}
     parts = {"goal": action.Goal, "result": action.Result, "feedback": action.Feedback}
     for name, message in parts.items():

@@ -39,18 +39,18 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """What the root of a loaded tree remembers of where it came from."""
+    """The origin of a loaded tree, kept at its root."""
 
     document: Document
     scope: Scope
     sources: dict[str, str]
-    """The texts of all files that it was made of, by path."""
+    """The texts of all files that made the tree, by path."""
 
 
 def _no_collecting(call: Callable[P, T]) -> Callable[P, T]:
     """Leave the garbage collector out while a document is made: nothing of it becomes garbage.
 
-    For 10,000 nodes it would otherwise take as long as all the rest.
+    With the collector, 10,000 nodes would take twice as long.
     """
 
     @wraps(call)
@@ -67,9 +67,9 @@ def _no_collecting(call: Callable[P, T]) -> Callable[P, T]:
 
 
 class Tree:
-    """A tree that was read and checked, from which behaviours are made as often as wanted.
+    """A tree that was read and checked, from which `build` makes behaviours as often as wanted.
 
-    What it was read from may change meanwhile: this stays what it is.
+    Later changes of the files do not touch this tree.
     """
 
     def __init__(
@@ -99,12 +99,12 @@ class Tree:
 
     @property
     def warnings(self) -> list[Finding]:
-        """The warnings that the tree has; an error would have raised."""
+        """The warnings about the tree; an error would have raised."""
         return self._workspace.findings
 
     @property
     def files(self) -> dict[Path, str]:
-        """Every file of the tree, as named, with the text that was read (none of data)."""
+        """Every file of the tree, by the name it was given, with its text ("" for a data file)."""
         return self._workspace.files
 
     def check_inputs(self, inputs: Mapping[str, object]) -> None:
@@ -112,11 +112,11 @@ class Tree:
         check_inputs(self._document, inputs, types=self._types)
 
     def build(self, inputs: Mapping[str, object] | None = None, *, once: bool = False) -> Behaviour:
-        """Make behaviours, with variables of their own; no node and no server are needed.
+        """Make behaviours with variables of their own, without a node or a server.
 
-        With `once` this is the last call: what was read is let go of on the way. Raises InputError
-        for inputs that do not fit, DocumentError for a class of a ``python:`` node that fails when
-        it is made.
+        `once` says that no other call follows, so the YAML nodes are dropped on the way. Raises
+        InputError for inputs that do not fit, and DocumentError for a class of a ``python:`` node
+        that fails to be made.
         """
         with self._building:
             return self._build(inputs or {}, once=once)
@@ -153,9 +153,9 @@ def open_tree(
 ) -> Tree:
     """Read and check a tree, with all that it includes and imports.
 
-    `types` and `python` as for `load_tree`; `python` may also be the names of the packages whose
-    classes a tree may name. With `within`, no file is read that does not lie in one of these
-    folders; links in them are followed wherever they lead.
+    `types` and `python` have the meaning they have in `load_tree`; `python` may also be the names
+    of the packages whose classes a tree may name. `within` are the folders that hold every file a
+    tree may read; a link in them may lead anywhere.
 
     Raises DocumentError with everything that is wrong with the tree.
     """
@@ -182,15 +182,15 @@ def load_tree(
     types: bool = True,
     python: bool = True,
 ) -> Behaviour:
-    """Return the behaviours of a tree, ready to be run; no node and no server are needed.
+    """Return the behaviours of a tree, ready to run, without a node or a server.
 
     `path` is a file, or the name of an installed tree. `inputs` are converted to the types that
     the tree declares. With `types=False` no ROS interface is looked up. With `python=False` a
     ``python:`` node is an error, and no module that the tree names is imported: for trees that are
     not trusted (docs/security.md).
 
-    Raises DocumentError with everything that is wrong with the tree, InputError for inputs that do
-    not fit; both are ValueErrors.
+    Raises DocumentError with everything that is wrong with the tree, and InputError for inputs that
+    do not fit; both are ValueErrors.
     """
     return open_tree(path, types=types, python=python).build(inputs, once=True)
 
@@ -236,7 +236,7 @@ def tree_outputs(root: Behaviour) -> dict[str, object]:
 
 
 def hidden_outputs(root: Behaviour) -> set[str]:
-    """Return the names of the outputs of a loaded tree that come of a secret."""
+    """Return the names of the outputs of a loaded tree that come from a secret."""
     loaded = getattr(root, LOADED, None)
     if not isinstance(loaded, Loaded):
         return set()
@@ -247,8 +247,8 @@ def hidden_outputs(root: Behaviour) -> set[str]:
 def check_file(path: PathLike, *, types: bool = True, python: bool = True) -> list[Finding]:
     """Find everything that is wrong with a tree, and with all that it includes and imports.
 
-    A class that a ``python:`` node names is imported for it, unless `types` or `python` is False;
-    with `python=False` such a node is an error.
+    The class of a ``python:`` node is imported for this, unless `types` or `python` is False. With
+    `python=False` such a node is an error.
     """
     workspace = Workspace()
     try:
@@ -263,7 +263,7 @@ def check_file(path: PathLike, *, types: bool = True, python: bool = True) -> li
 
 @_no_collecting
 def check_source(source: Source, *, types: bool = True, python: bool = True) -> list[Finding]:
-    """Do as `check_file` does, for a text that was read already."""
+    """Find what `check_file` finds, in a text that was read already."""
     workspace = Workspace()
     try:
         workspace.open_source(source)
@@ -312,5 +312,5 @@ def _found(path: PathLike) -> Path:
 
 
 def _shown(path: PathLike, found: Path) -> str | None:
-    """Return the path to show: the given one where that is the file, else where it was found."""
+    """Return the path to show: the given path where that is the file, else the found one."""
     return os.fspath(path) if path is found or Path(path) == found else None

@@ -1,6 +1,6 @@
 """JSON Schema of the tree language, made from the model, for completion in editors.
 
-An action's alias is the file's own word, so a node may have one key that the schema does not know.
+A node may have one key that the schema does not know: an action's alias is a word of the file.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from bt_actions.document.language.shapes import Key, keys_schema
 
 
 def json_schema() -> Schema:
-    """The schema of a tree, or of a file that trees import (JSON Schema 2020-12)."""
+    """Return the schema of a tree, or of a file that trees import (JSON Schema 2020-12)."""
     kinds = {name: _kind(kind) for name, kind in KINDS.items()}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -47,7 +47,7 @@ def _kind(kind: Kind) -> Schema:
 
 
 def _alias() -> Schema:
-    """One key that is no kind, and the keys of an action."""
+    """Return the schema of one key that is no kind, and of the keys of an action beside it."""
     schema = keys_schema(ACTION_KEYS)
     schema.pop("additionalProperties")
     settings = sorted(ACTION_KEYS)

@@ -1,7 +1,7 @@
-"""Where in a document a behaviour comes from, and the lines that made it.
+"""The place of a behaviour in its document, and the lines that made the behaviour.
 
-Works from what a loaded tree remembers (the attributes NODE and LOADED) and reads no
-file again. A behaviour made in Python was not written, and has nothing here.
+The source is what a loaded tree keeps (the attributes NODE and LOADED): no file is read again. A
+behaviour made in Python has nothing here.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """From a checked document to py_trees behaviours. Needs no ROS graph and starts nothing.
 
-The kinds of the nodes build the behaviours. Only documents without errors come here.
+The kinds of the nodes build the behaviours. All documents here are without errors.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ def build(
     once: bool = False,
     static: Mapping[str, object] = MappingProxyType({}),
 ) -> Behaviour:
-    """The behaviours of a document; each has its node.
+    """Return the behaviours of a document; each has its node.
 
-    `static` are its inputs as far as they are known, which the names of servers may hold. With
-    `once` no more will be made of it: its YAML is let go of on the way. What cannot be made is
-    reported to the document's source, as is every ``python:`` node that `python` does not allow.
-    Raises TooManyErrors, and InputError for a name that an input makes none.
+    `static` are the known inputs, which the names of servers may hold. `once` says that no second
+    call follows, so the YAML is dropped on the way. A node that fails to be made is reported to
+    the document's source, as is every ``python:`` node that `python` does not allow. Raises
+    TooManyErrors, and InputError for an input that makes a name invalid.
     """
     assert document.root is not None
     scope.hide(name for name, each in inputs_of(document).items() if each.secret)
@@ -69,9 +69,9 @@ def _topic(declared: Declared, context: Context) -> TopicValue:
 
 
 def _connect(root: Behaviour, topics: list[TopicValue]) -> None:
-    """Subscribe when the tree is set up, and unsubscribe when it is shut down.
+    """Subscribe at the tree's setup, and unsubscribe at its shutdown.
 
-    Any node may read a topic, foreign ones' children too; so the root of the document does it for
+    Any node may read a topic, also below a foreign node; so the root of the document subscribes for
     all, and no node is added to the tree.
     """
     set_up, shut_down = root.setup, root.shutdown

@@ -1,7 +1,7 @@
-"""What a node is built in: its document, its variables, its namespace. Builds nothing itself.
+"""The context of a node that is built: its document, its variables, its namespace. Builds nothing.
 
 The variables of a loaded tree lie on py_trees' blackboard under a namespace of their own. The
-blackboard is process-global and has no lock: read and write on the ticking thread only.
+blackboard is global to the process and has no lock: read and write on the ticking thread only.
 """
 
 from __future__ import annotations
@@ -43,20 +43,20 @@ _NUMBERS = {*fields.FLOATS, *fields.INTEGERS} - {"byte"}
 _NAME_ALONE = re.compile(r"\$[\w.]+")
 _ODD = re.compile(r"[^A-Za-z0-9_]")
 _LOADS = "/bt/loads"
-"""The blackboard's key of its own `_Loads`: on one that was cleared they begin anew."""
+"""The blackboard's key of its own `_Loads`: a cleared blackboard begins with a new one."""
 
 
 class _Loads:
-    """What tells the trees of a blackboard apart, and which of them are gone. Atomic steps only."""
+    """The loads of a blackboard: their numbers, and those that are gone. Atomic steps only."""
 
     def __init__(self) -> None:
         self.numbers = itertools.count(1)
         self.gone: deque[str] = deque()
-        """Prefixes of which no scope is left; the collector may come in the middle of a tick."""
+        """Prefixes without a scope any more; the collector may come in the middle of a tick."""
 
 
 class Scope:
-    """Names of a tree and where their values lie; `topics` are read before the blackboard."""
+    """The names of a tree and the places of their values; `topics` come before the blackboard."""
 
     def __init__(self, prefix: str) -> None:
         self.prefix = prefix
@@ -69,9 +69,9 @@ class Scope:
 
     @classmethod
     def of_load(cls, tree: str) -> Scope:
-        """The scope of a tree that is loaded now: no other load has the same.
+        """Return the scope of a tree that is loaded now; no other load has the same.
 
-        Its variables are forgotten at a later load, when nothing of the tree is left.
+        A later load forgets the variables, once nothing of the tree is left.
         """
         loads = Blackboard.storage.setdefault(_LOADS, _Loads())
         while True:
@@ -93,7 +93,7 @@ class Scope:
             self._gone.append(self.prefix)
 
     def inner(self, tree: str) -> Scope:
-        """The scope of a tree included in this one."""
+        """Return the scope of a tree included in this one."""
         name = _safe(tree)
         number = self._children[name] = self._children.get(name, 0) + 1
         scope = Scope(f"{self.prefix}/{name}_{number}")
@@ -101,11 +101,11 @@ class Scope:
         return scope
 
     def key(self, name: str) -> str:
-        """The blackboard key of a variable."""
+        """Return the blackboard key of a variable."""
         return f"{self.prefix}/{name}"
 
     def read(self, name: str) -> object:
-        """The value of a variable. Raises KeyError when it has none."""
+        """Return the value of a variable. Raises KeyError for one without a value."""
         return value_of(self.key(name))
 
     def write(self, name: str, value: object) -> None:
@@ -119,11 +119,11 @@ class Scope:
             Blackboard.metadata.setdefault(self.key(name), KeyMetaData())
 
     def hide(self, names: Iterable[str]) -> None:
-        """Have no event tell what these variables hold."""
+        """Keep the values of these variables out of all events."""
         hide(map(self.key, names))
 
     def hides(self, name: str) -> bool:
-        """Whether no event tells what a variable holds."""
+        """Return whether events leave a variable's value out."""
         return is_hidden(self.key(name))
 
     def clear(self, name: str) -> None:
@@ -137,7 +137,7 @@ def _safe(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What a node is built in: its document, its variables, its namespace."""
+    """The context of a node that is built: its document, its variables, its namespace."""
 
     document: Document
     scope: Scope
@@ -145,15 +145,15 @@ class Context:
     types: bool
     topics: Mapping[str, TopicValue]
     python: Python = True
-    """Which ``python:`` nodes may be made."""
+    """The ``python:`` nodes that may be made."""
     once: bool = False
     static: Mapping[str, object] = field(default_factory=dict)
-    """The inputs whose values are known before the tree runs, for the names of servers."""
+    """The inputs with values known before the tree runs, for the names of servers."""
     shared: dict[str | None, dict[str, Any]] = field(default_factory=dict)
-    """By actions: what their nodes have in common that say but a goal and a `save` of their own."""
+    """Common parts of nodes that set nothing but a goal and a `save` of their own, by action."""
 
     def read(self, name: str) -> object:
-        """The value of a variable. Raises KeyError when it has none, ExpressionError for a topic's.
+        """Return a variable's value. Raises KeyError without one, ExpressionError for a topic's.
 
         A topic's name is a variable, too: the latest message.
         """
@@ -161,13 +161,13 @@ class Context:
         return self.scope.read(name) if topic is None else topic.read()
 
     def write(self, values: Mapping[str, object]) -> None:
-        """Give variables their values, as `fitting` has them; all or none."""
+        """Give variables their values, converted by `fitting`; all or none."""
         self.scope.write_all({name: self.fitting(name, value) for name, value in values.items()})
 
     def fitting(self, name: str, value: object) -> object:
-        """A value as the variable's declared type wants it.
+        """Convert a value to the variable's declared type.
 
-        Raises ValueError for one that does not fit, or is too large to be kept.
+        Raises ValueError for a value that does not fit, or is too large to be kept.
         """
         kind = self._declared(name)
         try:
@@ -177,23 +177,23 @@ class Context:
             raise ValueError(f"{name}: {error}") from None
 
     def named(self, node: TreeNode, words: str, about: str | None = None) -> str:
-        """A node's name, or `words`, in which what is written stands for `{}`, or `about` does."""
+        """Return a node's name, or `words` with the node's text, or `about`, in place of `{}`."""
         return node.name or plain_name(words.format(written_text(node) if about is None else about))
 
     def name(self, values: Mapping[str, object], key: str) -> str:
-        """A ROS name in the namespaces that hold here."""
+        """Return a ROS name in the namespaces that hold here."""
         return self.joined(values, text_of(values, key))
 
     def namespace_of(self, values: Mapping[str, object]) -> str:
-        """The namespaces that hold below a node."""
+        """Return the namespaces that hold below a node."""
         return join_names(self.namespace, filled(text_of(values, "namespace"), self.static))
 
     def joined(self, values: Mapping[str, object], name: str) -> str:
-        """A name in the namespaces that hold here."""
+        """Return a name in the namespaces that hold here."""
         return join_names(self.namespace_of(values), filled(name, self.static))
 
     def default(self, topic: Declared) -> Callable[[], object]:
-        """The default of a topic as a function, which raises ValueError."""
+        """Return the default of a topic as a function, which raises ValueError."""
         kind, written = str(topic.values["type"]), topic.values["default"]
         if computed_in(written):
             compute = self.value(written)
@@ -202,11 +202,11 @@ class Context:
         return lambda: message
 
     def value(self, written: object) -> Callable[[], object]:
-        """A function that computes a value as it stands in the document."""
+        """Return a function that computes a value of the document."""
         return lambda: resolve(written, self.read)
 
     def condition(self, written: object, names: Names) -> Formula | None:
-        """A condition over a result as a function of that."""
+        """Return a condition over a result as a function of the result."""
         if not isinstance(written, Computed):
             return None
         return Formula(written.expression, names, self.read)
@@ -214,10 +214,10 @@ class Context:
     def saved(
         self, written: object, names: Names, cls: type | None = None
     ) -> dict[str, Callable[[Any], object]]:
-        """What `save` keeps, by the blackboard's key, as functions of a result.
+        """Return the values that `save` keeps, by blackboard key, as functions of a result.
 
-        They raise ValueError for what has no value, or does not fit its variable. `cls` is the
-        message that the result is, where that is known.
+        The functions raise ValueError for a missing value, or one that does not fit its variable.
+        `cls` is the message class of the result, where that is known.
         """
         return {
             self.scope.key(name): Formula(
@@ -231,18 +231,18 @@ class Context:
         }
 
     def _declared(self, name: str) -> str | None:
-        """The type of a variable, where it is declared."""
+        """Return the type of a variable, where it is declared."""
         declared = self.document.outputs.get(name) or self.document.inputs.get(name)
         kind = None if declared is None else declared.values.get("type")
         return kind if isinstance(kind, str) else None
 
     def said(self, written: object) -> str:
-        """A condition in one short line."""
+        """Return a condition in one short line."""
         assert isinstance(written, Computed)
         return plain_name(written.expression.text)
 
     def why_not(self, key: str, written: object) -> Callable[[], str]:
-        """A condition as a function that says what it is where it is false; or "".
+        """Return a function that says why a condition is false; or "" where it is true.
 
         The function raises ValueError where the condition cannot be computed.
         """
@@ -266,7 +266,7 @@ class Context:
         return why_not
 
     def holds(self, written: object) -> Callable[[], bool]:
-        """A condition over variables alone as a function, which raises ExpressionError."""
+        """Return a condition over variables alone as a function, which raises ExpressionError."""
         assert isinstance(written, Computed)
         return lambda: written.expression.holds({}, self.read)
 
@@ -275,7 +275,7 @@ class Context:
 def _numbers(
     expression: Expression, cls: type | None, declared: str | None
 ) -> Callable[[Any], object] | None:
-    """What gets a field of numbers that is of its variable's type as it is; None for any other."""
+    """Return a quick getter for a field of numbers of its variable's type; None for any other."""
     path, node = list[str](), expression.tree
     while isinstance(node, ast.Attribute):
         path.insert(0, node.attr)
@@ -296,7 +296,7 @@ def _numbers(
 
 
 def filled(name: str, inputs: Mapping[str, object]) -> str:
-    """A ROS name with what inputs put into it. Raises InputError for one that ROS refuses."""
+    """Put inputs into a ROS name. Raises InputError for a name that ROS refuses."""
     found = INPUT.findall(name)
     if not found:
         return name
@@ -310,12 +310,12 @@ def filled(name: str, inputs: Mapping[str, object]) -> str:
 
 
 def plain_name(text: str) -> str:
-    """A text as a node's name: one line, no colon."""
+    """Return a text in the form of a node's name: one line, no colon."""
     line = " ".join(text.split()).replace(":", ";")
     return line if len(line) <= 60 else f"{line[:57]}..."
 
 
 def written_text(node: TreeNode) -> str:
-    """What stands behind the kind's key, in the text's own words."""
+    """Return the text behind the kind's key, in the document's own words."""
     written = node.written[node.key.text]
     return written.text if isinstance(written, Scalar) else ""

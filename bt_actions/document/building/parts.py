@@ -1,4 +1,4 @@
-"""What several kinds are built with: of a goal, of what is sent, of what is read from an answer."""
+"""Parts that several kinds are built with: settings of goals, interfaces, readers of answers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def goal_settings(
     names: Names,
     timeout: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, Any]:
-    """What a goal is sent and judged by, whatever it says; `timeout` where nothing else is said."""
+    """Return the settings of a goal, but for its fields; `timeout` is the default."""
     given = settings.get("resources")
     resources = given if isinstance(given, list) else []
     return {
@@ -34,12 +34,12 @@ def goal_settings(
 
 @lru_cache(maxsize=1024)
 def _timeouts(fields: tuple[tuple[str, float | None], ...]) -> Timeouts:
-    """Most nodes of a tree have the timeouts of its action: they share one object."""
+    """Return one object for equal timeouts: most nodes of a tree have those of their action."""
     return Timeouts(**dict(fields))
 
 
 def retry_of(settings: Mapping[str, object], context: Context) -> Retry:
-    """How often to try, as settings say."""
+    """Return the retry of some settings."""
     fields = {**table_of(settings.get("retry"))}
     if "outcomes" in fields:
         fields["outcomes"] = frozenset(fields["outcomes"])
@@ -55,14 +55,14 @@ def _plain_retry(fields: tuple[tuple[str, Any], ...]) -> Retry:
 
 
 def interface_in(settings: Mapping[str, object], kind: Kind, context: Context) -> Any:
-    """The class of the interface that settings name; its name where no types are looked up."""
+    """Return the class of the interface in settings; its name where no types are looked up."""
     return interface(str(settings["type"]), kind) if context.types else settings["type"]
 
 
 def reader(
     values: Mapping[str, object], context: Context, condition: str, what: str, names: Names
 ) -> Callable[[Any], str]:
-    """What judges an answer or a message, and keeps parts of it, as `save` says."""
+    """Return a function that judges an answer or a message, and keeps parts of it by `save`."""
     expect = context.condition(values.get(condition), names)
     reading = Reading(expect, context.saved(values.get("save"), names), what=what)
     reading.set_up(None)

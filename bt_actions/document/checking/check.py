@@ -1,8 +1,8 @@
-"""The checks of names and types, in their order: what the form alone cannot tell.
+"""The checks of names and types, in their order.
 
-Those of single kinds are in `document/kinds/`, those of single values in `checker.py`. What is
-written in another file is told there where it is wrong by itself, and at the import where it is
-wrong in this tree only.
+The checks of single kinds are in `document/kinds/`, those of single values in `checker.py`. A
+mistake in another file is told there where the file is wrong by itself, and at the import where
+the file is wrong in this tree only.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def check_document(checker: Checker) -> None:
 
 
 def _check_form(checker: Checker, node: TreeNode) -> None:
-    """Check what the forms of a kind's keys tell of it: condition, number, what it talks over."""
+    """Check a node by the forms of its kind's keys: conditions, numbers, the ROS interface."""
     for key in GATES:
         if key in node.values:
             checker.condition(node.values[key], {})
@@ -78,7 +78,7 @@ def _check_form(checker: Checker, node: TreeNode) -> None:
 
 
 def _check_declarations(checker: Checker) -> None:
-    """Report what is wrong, and make what is declared known to the checker."""
+    """Check all declarations, and make them known to the checker."""
     document = checker.document
     for table in (document.inputs, document.outputs, document.topics):
         for name, declared in table.items():
@@ -151,7 +151,7 @@ def _check_default(checker: Checker, declared: Declared, default: object) -> Non
 
 
 def _check_actions(checker: Checker) -> None:
-    """The actions that are declared here, and of those imported what the nodes take over."""
+    """Check the actions that are declared here, and of imported ones what the nodes take over."""
     users: dict[str | None, list[dict[str, object]]] = {}
     if checker.document.imported:
         for node in checker.document.nodes():
@@ -170,7 +170,7 @@ def _check_actions(checker: Checker) -> None:
 
 
 def _check_defaults(checker: Checker) -> None:
-    """The condition in `defaults` is that of each action which has none nearer."""
+    """Check the condition in `defaults` for each action that has none nearer."""
     when = when_of(checker.document.defaults)
     if when is None:
         return
@@ -189,9 +189,9 @@ def _check_defaults(checker: Checker) -> None:
 
 @contextmanager
 def _within(checker: Checker, source: Source, what: str) -> Iterator[None]:
-    """Look at what stands in a source.
+    """Look at a part of a source, which may be imported.
 
-    Of one that is imported, what is wrong in this document only is told at the import.
+    A mistake of an imported source that is one in this document only is told at the import.
     """
     own, written = checker.source, checker.document.node.get("import")
     if source is own or written is None:
@@ -211,7 +211,7 @@ def _within(checker: Checker, source: Source, what: str) -> Iterator[None]:
 
 
 def _check_together(checker: Checker, node: TreeNode) -> None:
-    """Goals that are merged may each be right and not fit together: yaw, and x beside it."""
+    """Check merged goals: each part may be right, and not fit the other (yaw, and x beside it)."""
     declared = checker.document.actions[node.alias or ""]
     shared, own = declared.values.get("goal"), node.values.get("goal")
     if not isinstance(shared, dict) or not isinstance(own, dict):
@@ -237,7 +237,7 @@ def _is_computed(value: object, _kind: FieldType, _path: tuple[str | int, ...]) 
 
 
 def _left(settings: dict[str, object], nearer: list[dict[str, object]]) -> dict[str, object]:
-    """The settings that not everything nearer has others for."""
+    """Return the settings that something nearer does not replace everywhere."""
     left: dict[str, object] = {}
     for name, value in settings.items():
         over = [one[name] for one in nearer if name in one]

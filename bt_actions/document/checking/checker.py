@@ -1,7 +1,7 @@
-"""What all checks of names and types work with: what a document declares, writes and reads.
+"""The common ground of all checks of names and types: what a document declares, writes and reads.
 
-Checks single values and expressions; which there are, and in which order, is said in `check.py`.
-With `types=False` nothing of ROS is imported, and what would need it is taken for granted.
+Single values and expressions are checked here; `check.py` has the order of all checks. With
+`types=False` nothing of ROS is imported, and whatever would need ROS is taken as right.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ Types = MappingType[str, FieldType | None]
 
 @lru_cache(maxsize=1024)
 def _parts(cls: type | None, interface: Interface) -> tuple[FieldType | None, Types]:
-    """The type of what is sent, and the root of expressions over what comes back."""
+    """Return the type of the sent message, and the root of expressions over the received one."""
     more: Types = dict.fromkeys(interface.more)
     if cls is None:
         return None, {interface.root: None, **more}
@@ -84,7 +84,7 @@ def _parts(cls: type | None, interface: Interface) -> tuple[FieldType | None, Ty
 def _all_computed(
     kind: FieldType, value: object, types: MappingType[int, FieldType | None]
 ) -> bool:
-    """Whether a message's fields are all read from variables that fit: nothing is wrong there."""
+    """Return whether a message's fields are all read from variables that fit."""
     if not isinstance(value, dict) or not isinstance(kind, Message):
         return False
     given = []
@@ -97,7 +97,7 @@ def _all_computed(
 
 @lru_cache(maxsize=4096)
 def _fill(kind: Message, names: tuple[str, ...], *given: FieldType | None) -> bool:
-    """Whether values of such types fit the fields of these names."""
+    """Return whether values of such types fit the fields of these names."""
     wanted = describe(kind.cls)
     return all(
         name in wanted and fits(one, wanted[name]) and not misfits(one, wanted[name])
@@ -107,18 +107,18 @@ def _fill(kind: Message, names: tuple[str, ...], *given: FieldType | None) -> bo
 
 @lru_cache(maxsize=4096)
 def _noted(*_key: object) -> list[tuple[FieldType | None, list[Wrong]]]:
-    """Where the type is noted of expressions of one form that read the same types, if all is right.
+    """Return the list for the type of right expressions with one form and the same read types.
 
-    Kept for other trees, as the form is.
+    The list is kept for other trees, as the form is.
     """
     return []
 
 
 class Checker:
-    """What is known of one document; the trees that it includes have their own."""
+    """The knowledge about one document; each included tree has a checker of its own."""
 
     def __init__(self, document: Document, *, types: bool, python: Python = True) -> None:
-        """A ``python:`` node that `python` does not allow is an error, and nothing is imported."""
+        """Check a document; a ``python:`` node outside of `python` is an error, never imported."""
         self.document = document
         self.source = document.source
         self.doubts = Doubts(document)
@@ -128,10 +128,10 @@ class Checker:
         self.variables: dict[str, FieldType | None] = {}
         self.declared_at: dict[str, Declared] = {}
         self.reads = defaultdict[int, list[Computed]](list)
-        """What reads variables in each node, by the node's id; an alias's own under the alias's."""
+        """The expressions that read variables, by the node's id (or by that of the alias)."""
         self.reader: object = document
         self.writes = defaultdict[int, list[Write]](list)
-        """What each node writes, by the node's id, in the order of the text."""
+        """The writes of each node, by the node's id, in the order of the text."""
         self._items: dict[int, dict[str, Write]] = {}
         self._interfaces: dict[str, type | None] = {}
         self._classes: dict[str, type | None] = {}
@@ -139,9 +139,9 @@ class Checker:
     def interface(
         self, name: str, kind: str, node: Node, source: Source | None = None
     ) -> type | None:
-        """The class of a type name, or None after reporting (or when types are not checked).
+        """Return the class of a type name; None after a report, or where types are not checked.
 
-        What is written in another source is reported by the checker of that one.
+        A mistake in another source is reported by the checker of that source.
         """
         if not self.types:
             return None
@@ -156,14 +156,14 @@ class Checker:
         return self._interfaces[known]
 
     def doubts_of(self, included: Document) -> Doubts:
-        """What is not certain about a tree that this one includes."""
+        """Return the doubts about a tree that this one includes."""
         known = self._doubts_of.get(id(included))
         if known is None:
             known = self._doubts_of[id(included)] = Doubts(included)
         return known
 
     def _types_at(self, reader: object) -> Callable[[str], FieldType | None]:
-        """Gives the type of a variable as a node reads it."""
+        """Return a function for the type of a variable as a node reads it."""
         items = self._items.get(id(reader))
         if items is None:
             return self.variables.get
@@ -191,12 +191,12 @@ class Checker:
         return self._classes[name]
 
     def written_by(self, node: TreeNode) -> frozenset[str]:
-        """The names of the variables that a node itself writes."""
+        """Return the names of the variables that a node itself writes."""
         writes = self.writes.get(id(node))
         return frozenset([write.name for write in writes]) if writes else frozenset()
 
     def class_of(self, node: TreeNode) -> type | None:
-        """The class of the interface that a node talks over, or None after reporting."""
+        """Return the class of a node's interface, or None after a report."""
         if node.alias is not None:
             return self.action_class(self.document.actions[node.alias])
         interface = node.kind.interface
@@ -206,12 +206,12 @@ class Checker:
         return self.interface(name, interface.kind, node.written.get("type", node.key))
 
     def received(self, node: TreeNode) -> FieldType | None:
-        """The type of what comes back to a node: a result, an answer, a message."""
+        """Return the type of what a node receives: a result, an answer, a message."""
         cls, interface = self.class_of(node), node.kind.interface
         return _parts(cls, interface)[1][interface.root] if interface is not None else None
 
     def declared_type(self, declared: Declared | None) -> FieldType | None:
-        """The type of an input or an output; None where it has none, which is told there."""
+        """Return the type of an input or an output; None without one, reported elsewhere."""
         text = declared.values.get("type") if declared is not None else None
         try:
             return parse_type(text, types=self.types) if isinstance(text, str) else None
@@ -219,7 +219,7 @@ class Checker:
             return None
 
     def output_type(self, node: TreeNode, name: object) -> FieldType | None:
-        """The type of an output of a kind of one's own; None where it has none."""
+        """Return the type of an output of a declared kind; None without one."""
         outputs = table_of(self.document.kinds[node.key.text].values.get("outputs"))
         try:
             return parse_type(str(table_of(outputs.get(str(name))).get("type")), types=self.types)
@@ -227,7 +227,7 @@ class Checker:
             return None
 
     def _type_of(self, write: Write) -> FieldType | None:
-        """The type of what is written, without reporting anything."""
+        """Return the type of a written value, without any report."""
         node, value = write.node, write.value
         if node.kind.includes:
             outputs = node.included.outputs if node.included is not None else {}
@@ -253,7 +253,7 @@ class Checker:
         cls: type | None,
         interface: Interface = ACTION,
     ) -> None:
-        """Check what all kinds with an interface have in common."""
+        """Check the settings that all kinds with an interface share."""
         key = interface.fields
         asked, roots = _parts(cls, interface)
         if key in values and key in written:
@@ -301,7 +301,7 @@ class Checker:
     def value(
         self, kind: FieldType | None, value: object, node: Node, *, prose: bool = False
     ) -> None:
-        """Check a value against the type it must have; without one, only what it reads.
+        """Check a value against the type it must have; without a type, only the variables it reads.
 
         In `prose` a variable's bare name is a word like any other.
         """
@@ -311,7 +311,7 @@ class Checker:
             warn_unmarked(node, self.source, self.variables, prose=prose)
 
     def fit(self, kind: FieldType | None, value: object, node: Node, known: Container[str]) -> None:
-        """As `value`; what is `known` may be meant by a bare name where the value does not fit."""
+        """Check as `value`; a bare name may mean one of `known` where the value does not fit."""
         if value is BAD:
             return
         types = {id(part): self.expression(part, {}) for part in computed_in(value)}
@@ -404,7 +404,7 @@ class Checker:
             self.source.report("BT110", span_of(value.node), "more than zero is needed, not 0")
 
     def expression(self, computed: Computed, roots: Types) -> FieldType | None:
-        """Check what an expression reads and does; return its type, or None."""
+        """Check what an expression reads and computes; return its type, or None."""
         expression = computed.expression
         if expression.variables:
             self.reads[id(self.reader)].append(computed)
@@ -441,7 +441,7 @@ class Checker:
         return noted[0]
 
     def _unknown(self, computed: Computed) -> None:
-        """Report the variables that an expression reads and nobody declares or writes."""
+        """Report the variables that an expression reads and nothing declares or writes."""
         for name, span in computed.expression.variable_spans:
             if name not in self.variables and not self.doubts.declares(name):
                 self._report_unknown(name, computed, computed.span(self.source, *span))
@@ -473,7 +473,7 @@ class Checker:
 
 
 def _trap(node: Node) -> str | None:
-    """What YAML may have made of what was meant."""
+    """Say what YAML may have made of the text."""
     if isinstance(node, Scalar) and node.text in ("on", "off", "yes", "no"):
         return "YAML 1.2 reads this as a text: write true or false"
     return notation_here(node.text) if isinstance(node, Scalar) else None

@@ -1,7 +1,7 @@
-"""Hazards: what is allowed, and likely to go wrong on a robot. Each is a warning with a code.
+"""Hazards: trees that are allowed, and likely to go wrong on a robot. Each is a coded warning.
 
-Looks at one checked document (and at what it includes, where a hazard spans both). The hazards of
-single kinds are in `document/kinds/`.
+One checked document is looked at, and the trees that it includes where a hazard spans both. The
+hazards of single kinds are in `document/kinds/`.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from bt_actions.document.yaml.nodes import Node, span_of
 
 
 def find_hazards(checker: Checker) -> None:
-    """Report the hazards of a document that was checked, but for those that are not certain."""
+    """Report the hazards of a checked document, but for those that a doubt makes uncertain."""
     checker.doubts = Doubts(checker.document)  # anew: the checker found more
     if checker.document.root is not None:
         Hazards(checker).look(checker.document.root)
 
 
 class Hazards:
-    """What is known of a document that is looked at, also to the kinds of its nodes."""
+    """The hazards of a document, with answers for the kinds of its nodes."""
 
     def __init__(self, checker: Checker) -> None:
         self.checker = checker
@@ -49,13 +49,13 @@ class Hazards:
         self.verdicts = Verdicts()
         self._at_once = Verdicts(at_once=True)
         self.held: dict[tuple[int, str], dict[str, TreeNode]] = {}
-        """What trees that are included hold (`resources_below`)."""
+        """The resources of included trees (`resources_below`)."""
         self._slow: dict[int, bool] = {}
         self._above: dict[int, TreeNode] = {}
         self._anew: dict[int, TreeNode | None] = {}
         names = (None, *checker.document.actions)
         self._bounded = {one for one in names if _bounds(shared_settings(one, checker.document))}
-        """Actions whose goals have a deadline wherever they are used; None: all without a name."""
+        """Actions whose goals have a deadline in every node; None: all actions without a name."""
         self._unbounded: dict[str, TreeNode] = {}
         self._used: set[str] = set()
 
@@ -155,7 +155,7 @@ class Hazards:
             )  # fmt: skip
 
     def begin_anew(self, children: Sequence[TreeNode], onward: End) -> list[TreeNode]:
-        """What takes time in children that can end so, and begin again while a later one runs."""
+        """Return children that take time, can end so, and begin again while a later child runs."""
         slow = (self.takes_time(child) for child in children)
         last = max((at for at, takes in enumerate(slow) if takes), default=0)
         return [
@@ -165,14 +165,14 @@ class Hazards:
         ]
 
     def above(self, node: TreeNode) -> TreeNode | None:
-        """The node that holds this one; None at the root."""
+        """Return the parent of a node; None at the root."""
         if not self._above:
             for each in self.document.nodes():
                 self._above |= {id(child): each for child in each.children}
         return self._above.get(id(node))
 
     def _restarted(self, root: TreeNode) -> TreeNode | None:
-        """The first leaf below that takes time whenever it is begun, or the tree it is in."""
+        """Return the first leaf below that takes time at each begin, or the tree that holds it."""
         if id(root) in self._anew:
             return self._anew[id(root)]
         found: TreeNode | None = None
@@ -188,7 +188,7 @@ class Hazards:
         return found
 
     def takes_time(self, node: TreeNode) -> bool:
-        """Whether a node, or one below it, may take more than one tick."""
+        """Return whether a node, or one below it, may take more than one tick."""
         found = self._slow.get(id(node))
         if found is None:
             below = node.included.root if node.included is not None else None
@@ -279,6 +279,6 @@ def _can(can: Can, end: End) -> bool:
 
 
 def _bounds(settings: Mapping[str, object]) -> bool:
-    """Whether settings give the result a deadline, or say that there is none."""
+    """Return whether settings give the result a deadline, or say that there is none."""
     timeout = settings.get("timeout", {})
     return not isinstance(timeout, dict) or "result" in timeout

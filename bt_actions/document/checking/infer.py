@@ -1,6 +1,6 @@
-"""The type of an expression, as far as the types of what it reads are known.
+"""The type of an expression, as far as the types of its variables are known.
 
-Says what is wrong with it through a callback; an unknown type is None and never wrong.
+Mistakes go to a callback. An unknown type is None, and never a mistake.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def infer(
     *,
     types: bool = True,
 ) -> tuple[FieldType | None, list[Wrong]]:
-    """The type of an expression's value, or None when it is not known; and what is wrong with it.
+    """Return the type of an expression's value, or None for an unknown one; and its mistakes.
 
     With `types=False` no constant of a message is looked up.
     """
@@ -90,19 +90,19 @@ class _Inference:
     ) -> None:
         self.wrong: list[Wrong] = []
         self._fields: dict[ast.expr, tuple[type, str]] = {}
-        """The messages and fields that parts of the expression read."""
+        """The message and field behind each part of the expression that reads one."""
         self._types = types
         self._expression = expression
         self._roots = roots
         self._variable = variable
 
     def type_of(self, node: ast.expr) -> FieldType | None:
-        """The one type that a part has, or None."""
+        """Return the one type of a part, or None."""
         kind = self.any_type_of(node)
         return None if isinstance(kind, Either) else kind
 
     def any_type_of(self, node: ast.expr) -> FieldType | None:
-        """As `type_of`, or one of several."""
+        """Return the type of a part, which may be one of several."""
         match node:
             case ast.Compare(left=left, ops=ops, comparators=rights):  # often asked for first
                 self._compare([left, *rights], ops)
@@ -202,7 +202,7 @@ class _Inference:
         return known.get(name)
 
     def _asks_for(self, name: str) -> bool:
-        """Whether the expression asks if a key is there: ``'quick' in $item and $item.quick``."""
+        """Return whether the expression asks for a key: ``'quick' in $item and $item.quick``."""
         for part in ast.walk(self._expression.tree):
             match part:
                 case ast.Compare(left=ast.Constant(value=asked)) if asked == name:
@@ -281,7 +281,7 @@ class _Inference:
         return _power(right, second) if isinstance(op, ast.Pow) else INTEGER
 
     def _joined(self, *sides: tuple[ast.expr, FieldType | None]) -> FieldType | None:
-        """The type of a sum that is not known to be one of numbers."""
+        """Return the type of a sum that may be one of lists or texts."""
         lists_first = sorted(sides, key=lambda side: not isinstance(side[1], Listing))
         for (_, kind), (other, given) in (lists_first, lists_first[::-1]):
             text = self._expression.text[slice(*self._expression.span(other))]
@@ -305,7 +305,7 @@ class _Inference:
         return None
 
     def _computable(self, node: ast.BinOp) -> None:
-        """Say what goes wrong whatever the variables are: `1 / 0 > $n`, `$n % 0`."""
+        """Report what fails for any values of the variables: `1 / 0 > $n`, `$n % 0`."""
         left, right = _number_of(node.left), _number_of(node.right)
         if left is None and isinstance(node.op, (ast.Div, ast.FloorDiv, ast.Mod)):
             left = 1  # any number will do
@@ -378,14 +378,14 @@ class _Inference:
 
 
 def _one_of(kinds: Sequence[FieldType | None]) -> FieldType | None:
-    """The type of a value that has one of these types."""
+    """Return the type of a value that has one of these types."""
     if all(is_number(kind) for kind in kinds):
         return FLOAT if any(is_float(kind) for kind in kinds) else INTEGER
     return common_type(kinds)
 
 
 def _power(exponent: ast.expr, kind: FieldType) -> FieldType | None:
-    """The type of a whole number to the power of another; None where that may be below zero."""
+    """Return the type of a whole number to a power; None where the exponent may be below zero."""
     value = _number_of(exponent)
     if value is not None:
         return FLOAT if value < 0 else INTEGER
@@ -393,7 +393,7 @@ def _power(exponent: ast.expr, kind: FieldType) -> FieldType | None:
 
 
 def _number_of(node: ast.expr) -> int | float | None:
-    """The number that a part of an expression gives, where it reads nothing."""
+    """Return the number that a part of an expression gives without a variable."""
     try:
         match node:
             case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
@@ -411,7 +411,7 @@ def _number_of(node: ast.expr) -> int | float | None:
 
 
 def _never_held(cls: type, name: str, op: ast.cmpop, number: float, *, first: bool) -> str | None:
-    """What is wrong with a field that is compared with a number; `first` is the field, or not."""
+    """Say why a comparison of a field with a number never holds; `first` for the field first."""
     allowed = _RANGES.get(interface_name(cls), {}).get(name)
     kind = type(op) if first else _TURNED.get(type(op), type(op))
     if allowed is None or kind not in (*_TURNED, ast.Eq, ast.NotEq):

@@ -1,7 +1,6 @@
-"""One name with two types: an action server, a service or a topic, over all trees included: BT217.
+"""Names with two types: an action server, a service or a topic, over all trees included: BT217.
 
-A relative name is taken for what it is in the namespace `/`: that which the tree will run in is not
-known here.
+The namespace that a tree will run in is not known here: a relative name counts as one in `/`.
 """
 
 from __future__ import annotations
@@ -27,13 +26,13 @@ from bt_actions.document.yaml.nodes import Node, span_of
 _WORDS = {"action": "the action server", "srv": "the service", "msg": "the topic"}
 _TOPIC = Interface("msg", "topic")
 _MOST = 10_000
-"""Names of a tree and those that it includes that are compared: subtrees can multiply them."""
+"""Names of a tree and of its included trees that are compared: subtrees can multiply them."""
 _Name = tuple[str, str]
 """The kind of interface, and the full name."""
 
 
 class _Use(NamedTuple):
-    """Where a name is used with a type; `at` is in the document that is checked."""
+    """A use of a name with a type; `at` is in the checked document."""
 
     type: str
     place: Place
@@ -63,7 +62,7 @@ def check_names(checker: Checker) -> None:
 
 
 def _uses(document: Document, known: _Known) -> Iterator[tuple[_Name, _Use]]:
-    """The names that a document uses, in its own namespace; `known` keeps those of the included."""
+    """Yield the names that a document uses, in its own namespace; `known` keeps included trees'."""
     for declared in document.topics.values():
         at = _place(declared, document, document.node.get("import") or document.node)
         yield from _use(_TOPIC, declared.values, at, document)
@@ -90,7 +89,7 @@ def _uses(document: Document, known: _Known) -> Iterator[tuple[_Name, _Use]]:
 
 
 def _place(declared: Declared, document: Document, used: Node) -> tuple[Place, Node]:
-    """Where a name is declared, and where that is told in the document, which may import it."""
+    """Return the place of a declaration, and the node in the document to report it at."""
     own = declared.source is document.source
     return declared.place, declared.written("type") if own else used
 

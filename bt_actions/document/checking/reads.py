@@ -1,14 +1,14 @@
-"""Variables that are read while they have no value: BT302 and BT320.
+"""Reads of variables without a value: BT302 and BT320.
 
-BT302 goes by the order of ticks. It follows what is written by the time a node has succeeded, and
-by the time it has failed: a sequence goes on with the first, a fallback with the second. Where
-several rounds or branches may have written a name, nothing is claimed.
+BT302 goes by the order of ticks. The check keeps two sets of written names for a node: those after
+its success, and those after its failure. A sequence goes on with the first set, a fallback with the
+second. A name that several rounds or branches may have written is left alone.
 
-BT320 is about later children of a fallback that fail for the value that an earlier one lacked, for
-whose failure they are there. A node fails where it reads a topic without a message, or a variable
-that nothing has written; a log does not. A later child that reads the value in a check of its own
-is one of several cases, and no hazard, unless the earlier one does nothing but ask and no other
-child is left. Behind a child that asks `known`, nothing is one.
+BT320 is about a fallback: a later child reads the value whose lack made an earlier child fail, and
+fails for the same reason. A node fails where it reads a topic without a message, or a variable
+without a value; a log does not. A later child that reads the value in a check of its own is one of
+several cases, and no hazard, unless the earlier child is only a check and no other child is left.
+Behind a child that asks `known`, no read is a hazard.
 """
 
 from __future__ import annotations
@@ -28,18 +28,17 @@ from bt_actions.document.yaml.nodes import span_of
 
 _NOTHING: frozenset[str] = frozenset()
 _DOES_WITHOUT = (End.FAILURE, End.ANY)
-"""The ends of its child that a decorator succeeds after where the child's failure is none."""
+"""Values of `goes_on` with which a child's failure is no failure of the decorator."""
 _Written = tuple[Set[str], Set[str]]
-"""Names that may have been written below a node when it has succeeded, and when it has failed.
+"""Names that a node and those below may have written: after its success, and after its failure.
 
-What has been written meanwhile is in both: a node that is stopped has written no more than if it
-had failed.
+A stopped node counts as a failed one: both sets hold the names written meanwhile.
 """
 _SILENT: _Written = (_NOTHING, _NOTHING)
 
 
 def find_early_reads(checker: Checker, root: TreeNode) -> None:
-    """Report the reads that no write can come before."""
+    """Report the reads that no write can precede."""
     _Order(checker).visit(root, _NOTHING, _NOTHING)
 
 
@@ -49,26 +48,26 @@ class _Order:
         self._doubts = checker.doubts
         document = checker.document
         self._known = {*document.inputs, *document.topics, *always_there(document)}
-        """What may have been written when the node is reached that is visited now."""
+        """Names that may have a value when the visit reaches the current node."""
         self._passed: set[str] = set()
-        """What the nodes write that were visited already."""
+        """Names that visited nodes write."""
         actions = checker.document.actions.items()
         self._shared: dict[str | None, Sequence[Computed]] = {
             name: checker.reads.get(id(declared), ()) for name, declared in actions
         }
-        """What is read by the declaration of an action."""
+        """The expressions in the declaration of each action."""
 
     @cached_property
     def _writers(self) -> Counter[str]:
-        """How many nodes write a name."""
+        """The number of nodes that write each name."""
         own = map(self._checker.written_by, self._checker.document.nodes())
         return Counter(chain.from_iterable(own))
 
     def visit(self, node: TreeNode, around: frozenset[str], later: frozenset[str]) -> _Written:
-        """Look at a node and what is below it.
+        """Visit a node and the nodes below it.
 
-        `around` is what loops and branches around it may have written, `later` what they write only
-        when nothing in their first round has failed.
+        `around` are the names that loops and branches around the node may have written. `later` are
+        names that these write only after a first round without a failure.
         """
         own = self._checker.written_by(node)
         self._reads(node, own, around)
@@ -173,11 +172,11 @@ class _Need(NamedTuple):
 
 
 _Needs = tuple[tuple[_Need, ...], frozenset[str]]
-"""What a node needs, in order, and the names that have a value when it has succeeded."""
+"""The needs of a node, in order, and the names with a value after its success."""
 
 
 def find_missing(checker: Checker, root: TreeNode) -> None:
-    """Report the reads in later children of fallbacks that fail for what an earlier one lacked."""
+    """Report reads of later children in fallbacks that fail for the lack of an earlier child."""
     if any(node.kind.in_turn is End.FAILURE for node in checker.document.nodes()):
         _Missing(checker).visit(root)
 
@@ -188,12 +187,12 @@ class _Missing:
         self._doubts = checker.doubts
         self._known: dict[int, _Needs] = {}
         self._written: set[str] = set()
-        """What nodes write that come before the one that is visited now."""
+        """Names that nodes before the current one write."""
         self._there = {*checker.document.inputs, *always_there(checker.document)}
-        """What has a value whenever that node is reached."""
+        """Names that have a value whenever the visit reaches the current node."""
 
     def visit(self, node: TreeNode) -> None:
-        """Look at a node and what is below it."""
+        """Visit a node and the nodes below it."""
         if node.kind.in_turn is End.FAILURE and not self._doubts.below(node):
             self._look_at(node)
         self._written |= self._checker.written_by(node)

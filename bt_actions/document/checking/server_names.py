@@ -1,6 +1,6 @@
-"""Inputs in the names of servers, topics and namespaces: known before a tree runs, and texts.
+"""Inputs in the names of servers, topics and namespaces: texts, known before a tree runs.
 
-Clients are made when a tree is set up. So what stands in a name has to be an input of the root, or
+Clients are made when a tree is set up. So an input in a name has to be an input of the root, or
 one of a subtree whose `with` gives a constant, or such an input, all the way up.
 """
 
@@ -27,7 +27,7 @@ def _names(
 
 
 def _names_in(document: Document) -> Iterator[tuple[str, Node]]:
-    """What stands in the names of a document, and where."""
+    """Yield the inputs in the names of a document, each with its YAML node."""
     top = {key.text: node for key, node in document.node.pairs}
     yield from _names(document.values, TOP_KEYS, top)
     for table, keys in ((document.actions, ALIAS.keys), (document.topics, TOPIC.keys)):
@@ -40,7 +40,7 @@ def _names_in(document: Document) -> Iterator[tuple[str, Node]]:
 
 
 def inputs_in_names(document: Document, known: dict[int, set[str]] | None = None) -> set[str]:
-    """The inputs that have to be known before a tree runs; `known` are those of other trees."""
+    """Return the inputs that a tree needs before it runs; `known` holds those of other trees."""
     known = {} if known is None else known
     if id(document) not in known:
         found = known[id(document)] = {name for name, _ in _names_in(document)}
@@ -54,7 +54,7 @@ def inputs_in_names(document: Document, known: dict[int, set[str]] | None = None
 
 
 def check_server_names(checker: Checker) -> None:
-    """Report what stands in a name and is no input, or no text."""
+    """Report a variable in a name that is no input, or no text."""
     document = checker.document
     if document.root is None:
         return  # a library's names have the inputs of whoever imports it

@@ -1,4 +1,4 @@
-"""Names of variables that a text holds as they are, where their values may be meant: BT315.
+"""Bare names of variables in texts, where an author may mean their values: BT315.
 
 Other languages write `{name}`, `{{ name }}`, `%(name)s`, `<name>` or `@name`; here that is text.
 """
@@ -19,14 +19,14 @@ _FORMS = re.compile(
     re.ASCII,
 )
 _SIGNS = frozenset("{%<@")
-"""One of these is in all of them: looking for it is quicker."""
+"""Characters of which each notation has one: a quick test before the slow one."""
 _NAME = re.compile(r"(?<![\w.$'\"/])[A-Za-z]\w*", re.ASCII)
 
 
 def warn_unmarked(value: Node, source: Source, known: Container[str], *, prose: bool) -> None:
-    """Warn of the known names in a value's texts; of bare ones only where it is no prose.
+    """Warn of the known names in a value's texts; of bare ones only outside of prose.
 
-    A bare name in quotes is taken for text.
+    A bare name in quotes is text.
     """
     waiting = [value]
     while waiting:
@@ -60,7 +60,7 @@ def _in_other_words(node: Scalar, source: Source, known: Container[str]) -> None
 
 
 def marked_here(node: Node, source: Source, known: Container[str]) -> str | None:
-    """What to write for a text that is nothing but names of variables and what computes them."""
+    """Say what to write for a text of nothing but names of variables and their computations."""
     if not isinstance(node, Scalar) or not node.plain or "$" in node.text:
         return None
     marked = _NAME.sub(lambda name: ("$" if name[0] in known else "") + name[0], node.text)

@@ -1,4 +1,4 @@
-"""The types of values that a tree writes out, and of variables; which are compared or joined."""
+"""The types of literals and of variables, and the types that can be compared or joined."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from bt_actions.expressions.functions import KNOWN
 from bt_actions.messages.fields import FLOATS, INTEGERS, FieldType, Listing, Scalar
 
 _ROUNDS = 8
-"""How far a type is followed from variable to variable, before none is taken for known."""
+"""Steps from variable to variable after which a type counts as unknown."""
 _NUMBERS = frozenset({*INTEGERS, *FLOATS})
 BOOL, INTEGER, FLOAT, TEXT = Scalar("bool"), Scalar("int64"), Scalar("float64"), Scalar("string")
 
 
 def type_of_literal(value: object) -> FieldType | None:
-    """The type of plain data, where it has one."""
+    """Return the type of plain data, where it has one."""
     if isinstance(value, bool):
         return BOOL
     if isinstance(value, int):
@@ -32,9 +32,9 @@ def type_of_literal(value: object) -> FieldType | None:
 
 
 def common_type(kinds: Sequence[FieldType | None]) -> FieldType | None:
-    """The type of an item of a list whose items have these types; None where one is not known.
+    """Return the type of an item of a list with items of these types; None for an unknown one.
 
-    Where all are records, it is one with the keys of all.
+    Of records alone, the type is a record with the keys of all.
     """
     known = [kind for kind in dict.fromkeys(kinds) if kind is not None]
     if not known or None in kinds:
@@ -64,7 +64,7 @@ def _merged(records: Sequence[Record]) -> Record:
 
 
 def named(kind: FieldType | None) -> str:
-    """A type with its article."""
+    """Return the name of a type with its article."""
     text = str(kind)
     return f"an {text}" if text[0] in "aeioAEIO" else f"a {text}"
 
@@ -96,7 +96,7 @@ def comparable(first: FieldType, second: FieldType) -> bool:
 
 
 def unjoinable(kind: Listing, given: FieldType) -> str | None:
-    """What a list of some type is joined with, where that is not the type given."""
+    """Say what a list of some type can be joined with, where that is not the type given."""
     if not isinstance(given, Listing):
         return "a list is joined with a list"
     items = kind.item, given.item
@@ -105,7 +105,7 @@ def unjoinable(kind: Listing, given: FieldType) -> str | None:
 
 
 def joined(first: FieldType, second: FieldType) -> FieldType | None:
-    """The type of two lists that are joined; None where it is not known."""
+    """Return the type of two joined lists; None for an unknown one."""
     if not isinstance(first, Listing) or not isinstance(second, Listing):
         return None
     size = None if None in (first.size, second.size) else (first.size or 0) + (second.size or 0)
@@ -117,7 +117,7 @@ def joined(first: FieldType, second: FieldType) -> FieldType | None:
 
 
 def _converts(kind: FieldType) -> bool:
-    """Whether `int` and `float` take it."""
+    """Return whether `int` and `float` take a value of this type."""
     return is_number(kind) or is_text(kind)
 
 
@@ -133,16 +133,16 @@ ONE_VALUE: Mapping[str, tuple[Callable[[FieldType], bool], str, FieldType]] = {
         TEXT,
     ),
 }
-"""Functions of one value: which types they take, what is said of others, and what they give."""
+"""Functions of one value: the types they take, the words for other types, and their own type."""
 
 
 def items_inside(
     writers: Mapping[str, Sequence[Write]], declared: Container[str]
 ) -> dict[int, dict[str, Write]]:
-    """What gives the nodes inside of loops their items, by the node's id.
+    """Return the writes of loop items, for the nodes inside of loops, by the node's id.
 
-    Only where several loops use one name, and nothing else writes it: inside of each it has the
-    type of that loop's items.
+    Only names that several loops share, and nothing else writes, are here: inside of each loop the
+    name has the type of that loop's items.
     """
     inside: dict[int, dict[str, Write]] = {}
     for name, loops in writers.items():
@@ -164,9 +164,9 @@ def infer_variables(
 ) -> None:
     """Give the `variables` that nodes write the one type that all of them write, or None.
 
-    What is declared keeps its type. A value may be computed from a variable that is written further
-    down, or from itself (a counter): so unknown types are left out of account at first, and count
-    once every variable has had its chance.
+    A declared variable keeps its type. A value may be computed from a variable that is written
+    further down, or from itself (a counter): so unknown types do not count at first, and count once
+    every variable has had its chance.
     """
     writers = {name: writes for name, writes in writers.items() if name not in variables}
     variables.update(dict.fromkeys(writers))

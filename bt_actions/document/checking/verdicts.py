@@ -1,4 +1,4 @@
-"""How a node can end, and how long it may take, as far as that can be read off the document."""
+"""The ends of a node, and the time it may take, as far as the document tells."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from bt_actions.document.reading.tree import Document, TreeNode, settings_of
 
 
 class Verdicts:
-    """Answers for the nodes of a document, which their kinds give; each is worked out once.
+    """Verdicts on the nodes of a document, given by their kinds; each is worked out once.
 
-    With `at_once` they are about a tick in which a node begins and ends, and nothing in it fails
-    because it cannot be computed.
+    With `at_once` a verdict is about a tick in which a node begins and ends, and in which nothing
+    fails for lack of a value.
     """
 
     def __init__(self, *, at_once: bool = False) -> None:
@@ -21,7 +21,7 @@ class Verdicts:
         self._budgets: dict[int, float] = {}
 
     def of(self, node: TreeNode) -> Can:
-        """How a node can end."""
+        """Return how a node can end."""
         found = self._known.get(id(node))
         if found is None:
             found = self._known[id(node)] = self._work_out(node)
@@ -39,7 +39,7 @@ class Verdicts:
         return kind.ends(node.values, [self.of(child) for child in below], self._at_once)
 
     def budget(self, node: TreeNode, document: Document) -> float:
-        """The seconds that a node's deadlines and pauses add up to; what has none counts nothing.
+        """Return the sum of a node's deadlines and pauses in seconds.
 
         `document` is the one that the node stands in.
         """
@@ -64,18 +64,18 @@ class Verdicts:
 
 
 def _below(node: TreeNode) -> list[TreeNode]:
-    """A node's children, or the root of the tree that it stands for."""
+    """Return a node's children, or the root of the tree that it stands for."""
     root = node.included.root if node.included is not None else None
     return node.children if root is None else [root]
 
 
 def of_rounds(each: float, count: int) -> float:
-    """The seconds of so many rounds."""
+    """Return the seconds of so many rounds."""
     return each * float(min(count, 10**12))  # which no arithmetic overflows with
 
 
 def of_tries(each: float, retry: object) -> float:
-    """The seconds of all tries and the pauses between; nothing where a try has no limit."""
+    """Return the seconds of all tries and the pauses between; 0 where a try has no limit."""
     if not isinstance(retry, dict) or each == 0.0:
         return each
     attempts = retry.get("attempts", 1)

@@ -1,7 +1,7 @@
-"""What is wrong with a document, and where: values, and the one error that carries them.
+"""Findings: what is wrong with a document, and where, as values; and the error that carries them.
 
-A finding is complete when it is made: it holds the source line, so that it can be shown after the
-file has changed or when it came from standard input.
+A finding is complete when it is made: it holds the source line, so that a finding can be shown
+after the file has changed, or for a text from standard input.
 """
 
 from __future__ import annotations
@@ -16,8 +16,9 @@ from bt_actions.utilities.shorten import fit
 
 NODE = "_bt_actions_node"
 LOADED = "_bt_actions_loaded"
-"""The attribute of a behaviour that has the node it was made from, and that of a loaded root which
-has its document. Not such as a user's own class may have."""
+"""The attributes of a behaviour for the node that made it, and of a loaded root for its document.
+The names are such that no class of a user has them.
+"""
 
 
 class Place(NamedTuple):
@@ -49,7 +50,7 @@ class Severity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """What a code stands for, with two trees, or for what no tree can show with two commands."""
+    """The rule behind a code, with a wrong and a right tree, or two commands where no tree does."""
 
     code: str
     title: str
@@ -60,11 +61,11 @@ class Rule:
 
     @property
     def language(self) -> str:
-        """What the examples are written in."""
+        """The language of the examples."""
         return "yaml" if self.wrong.startswith(("tree:", "- ")) else "sh"
 
     def page(self) -> str:
-        """All of it as plain text."""
+        """Return the rule as plain text."""
         title = f"{self.code}: {self.title} ({self.severity})"
         parts = [title, "", textwrap.fill(self.text, 88), ""]
         for word, example in (("Wrong", self.wrong), ("Right", self.right)):
@@ -82,7 +83,7 @@ class Related:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing wrong. Lines and columns count from 1; `end_column` is one past the last."""
+    """One mistake. Lines and columns count from 1; `end_column` is one past the last."""
 
     file: str
     line: int
@@ -102,7 +103,7 @@ class Finding:
         return Place(self.file, self.line, self.column)
 
     def headline(self) -> str:
-        """``trees/x.yaml:14:17: error[BT203]: MoveRobot.Goal has no field 'distnace'``"""
+        """Return ``trees/x.yaml:14:17: error[BT203]: MoveRobot.Goal has no field 'distnace'``."""
         return f"{self.place}: {self.severity}[{self.code}]: {fit(self.message, 250)}"
 
     def __str__(self) -> str:
@@ -132,7 +133,7 @@ class DocumentError(ValueError):
 
 
 def _excerpt(finding: Finding, width: int) -> list[str]:
-    """The source line with a caret under the exact range, cut where it is very long."""
+    """Return the source line, cut where it is very long, and a line of carets under the range."""
     text = finding.source_line or ""
     if not text.isprintable():  # a tab, or the end of a line to some terminals
         text = "".join(char if char.isprintable() else " " for char in text)

@@ -1,7 +1,6 @@
-"""What people write who come from other tools, and what is written here instead.
+"""Words and notations of other tools, and what to write here instead.
 
-Tables of words, and the notations of variables and files that other tools have. Whoever reports a
-mistake asks here before it asks what is spelled alike: `Switch` is no 'wait'.
+A report of a mistake asks this file before it asks for similar spellings: `Switch` is no 'wait'.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from bt_actions.utilities.suggest import folded
 
 
 def _table(rows: MappingType[str, str]) -> dict[str, str]:
-    """What is written here, by each of the words that stand behind it."""
+    """Turn a table round: from each foreign word to the words here."""
     return {word: here for here, words in rows.items() for word in words.split()}
 
 
@@ -60,7 +59,7 @@ _KINDS = _table(
         "here it is 'pipeline'": "pipelinesequence",
     }
 )  # fmt: skip
-"""What a kind of node is called elsewhere, in small letters and without underscores."""
+"""Kinds of nodes under their foreign names, in small letters and without underscores."""
 _FIELDS = ("goal", "request", "message", "with", "arguments", "inputs")
 _AGAIN = "retry: {attempts: 3, backoff: 2 s}"
 _KEYS: dict[str, tuple[str, ...]] = {
@@ -86,7 +85,7 @@ _KEYS: dict[str, tuple[str, ...]] = {
     }.items()
     for word in words.split()
 }
-"""What a key is called elsewhere, and the keys here: the first that can stand in the place."""
+"""Keys under their foreign names, with the keys here: the first that can stand in the place."""
 _INSTEAD: dict[str, tuple[str, str]] = {
     word: (beside, here)
     for words, beside, here in (
@@ -104,7 +103,9 @@ _INSTEAD: dict[str, tuple[str, str]] = {
     )
     for word in words.split()
 }  # fmt: skip
-"""What to do in the place of a key that there is not, where another key could stand beside it."""
+"""What to do in place of a foreign key that has no equal here, where another key could stand
+beside it.
+"""
 _TYPES = _table(
     {
         "write float64": "double real",
@@ -117,9 +118,9 @@ _TYPES = _table(
         "a mapping is written as a message's type: package/msg/Name": "dict map object mapping any",
     }
 )
-"""What a type is called elsewhere."""
+"""Types under their foreign names."""
 _REACH = 300
-"""So much of a text is looked at."""
+"""Characters of a text that are looked at."""
 _ASSIGNED = re.compile(r"\$?([A-Za-z]\w*)\s*:?=\s*([^\s=][^=]*)", re.ASCII)
 _PACKAGE = re.compile(r"\$\(find(?:-pkg-share)? +([\w-]+)\)/*(\S+)", re.ASCII)
 _NOTATION = re.compile(
@@ -132,13 +133,13 @@ _NOTATION = re.compile(
 
 
 def kind_here(word: str) -> str | None:
-    """What to write for a kind of node that is called so elsewhere: ``here it is 'fallback'``."""
+    """Say what to write for a foreign kind of node: ``here it is 'fallback'``."""
     wanted = folded(word)
     return _KINDS.get(wanted) or _KINDS.get(wanted.rstrip("0123456789"))  # BehaviorTree's Switch2
 
 
 def key_here(word: str, known: Container[str]) -> tuple[str | None, str | None]:
-    """What to write for a key where `known` can stand: another key, or something else to do."""
+    """Say what to write for a key where `known` can stand: another key, or something else to do."""
     wanted = folded(word)
     for key in _KEYS.get(wanted, ()):
         if key.partition(":")[0] in known:
@@ -148,16 +149,16 @@ def key_here(word: str, known: Container[str]) -> tuple[str | None, str | None]:
 
 
 def type_here(text: str) -> str | None:
-    """What to write for a type that is called so elsewhere: ``write float64``."""
+    """Say what to write for a foreign type: ``write float64``."""
     word = re.match("[A-Za-z]+", text)
     return _TYPES.get(folded(word[0])) if word is not None and "/" not in text else None
 
 
 def notation_here(text: str, at: int | None = None, *, computes: bool = False) -> str | None:
-    """What to write for a variable in the notation of other tools: ``{x}``, ``${x}``, ``{{ x }}``.
+    """Say what to write for a variable in a foreign notation: ``{x}``, ``${x}``, ``{{ x }}``.
 
-    Looks at the place `at`, or for the first. `computes` says that the text is an expression, in
-    which a variable is never `$(x)`.
+    Looks at the place `at`, or for the first notation. `computes` says that the text is an
+    expression, in which a variable is never `$(x)`.
     """
     find = _NOTATION.search if at is None else _NOTATION.match
     found = find(text, at or 0, (at or 0) + _REACH)
@@ -175,15 +176,15 @@ def notation_here(text: str, at: int | None = None, *, computes: bool = False) -
 
 
 def package_here(text: str) -> str | None:
-    """What to write for a tree's file as ROS launch finds it in a package."""
+    """Say what to write for a tree's file in ROS launch's notation of a package."""
     found = _PACKAGE.match(text[:_REACH])
     return None if found is None else f"write package://{found[1]}/{found[2]}"
 
 
 def as_mapping(text: str, root: str | None = None) -> str | None:
-    """What to write for a mapping that was written as ``a=1, b=2``.
+    """Say what to write for a mapping in the form ``a=1, b=2``.
 
-    With `root`, a name by itself is meant as its part: `x` as `{x: result.x}`.
+    With `root`, a name by itself means a part of it: `x` means `{x: result.x}`.
     """
     if text.startswith("{") and ":" in text and text.endswith("}"):
         return "without its quotes it is a mapping"

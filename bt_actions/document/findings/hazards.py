@@ -1,4 +1,4 @@
-"""The rules about hazards, as in `rules.py`, and what many examples begin with."""
+"""The rules about hazards, in the form of `rules.py`, and common beginnings of their examples."""
 
 from __future__ import annotations
 

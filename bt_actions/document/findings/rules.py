@@ -1,4 +1,4 @@
-"""The rules a document is checked by, each with a wrong and a right example, which are tested.
+"""The rules of the checker, each with a wrong and a right example, which are tested.
 
 BT1xx is about the text, BT2xx about names and types, BT3xx (`hazards.py`) about hazards on a robot.
 A code never changes. `bt-actions explain` prints the rules, and docs/rules.md is made of them.

@@ -1,1 +1,1 @@
-"""Trees in canonical form: what moves, what stays. The meaning never changes."""
+"""Trees in canonical form. The meaning of a tree never changes."""

@@ -1,11 +1,11 @@
 """A tree in canonical form: two spaces, a node's kind first, keys as in the model, comments kept.
 
-Scalars stay as they were written, and so does what stands in { } or [ ] with comments or texts of
-several lines in it. What comes out is read again and compared before it is given back, so that
-formatting can never change what a tree means.
+Scalars stay as they are written. So does a { } or [ ] that holds a comment, or a text of several
+lines. The new text is read again and compared before it is returned: formatting never changes the
+meaning of a tree.
 
-Comments go with what follows them, or stand behind what they stood behind. One that silences a
-warning goes with the line that follows it, whatever becomes of the item that begins there.
+A comment goes with the line that follows it, or stays behind the words before it. A comment that
+silences a warning goes with the line that follows it, even where the item of that line moves.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ _DASHES = re.compile(r"\s*-(\s+-)*\s*")
 
 
 def format_source(source: Source) -> str:
-    """The text of a document in canonical form.
+    """Return the text of a document in canonical form.
 
-    Raises DocumentError when it is not YAML, FormatError for what cannot be kept as it is.
+    Raises DocumentError for a text that is not YAML, FormatError for one that would lose something.
     """
     if compose(source) is None or source.has_errors:
         if not source.findings:
@@ -70,7 +70,7 @@ def _written(source: Source) -> tuple[Node | None, dict[int, str]]:
 
 
 def _compare(source: Source, root: Node, anchors: dict[int, str], text: str) -> None:
-    """See that the new text says the same, with every comment of the old one."""
+    """Compare the new text with the old: the same data, with every comment."""
     again = Source(source.name, text)
     formatted, names = compose_written(again)
     if any("no anchor" in finding.message for finding in again.findings):
@@ -83,7 +83,7 @@ def _compare(source: Source, root: Node, anchors: dict[int, str], text: str) -> 
 
 
 def _data(node: Node, anchors: dict[int, str]) -> object:
-    """What a node says, without unfolding aliases; keys in one order."""
+    """Return a node's data, without unfolding aliases; keys in one order."""
     name = anchors.get(id(node))
     if isinstance(node, Alias):
         return ("*", node.name)
@@ -97,11 +97,11 @@ def _data(node: Node, anchors: dict[int, str]) -> object:
 
 
 class FormatError(ValueError):
-    """The text is YAML that this cannot format without a loss; it was left alone."""
+    """YAML that cannot be formatted without a loss; the text stays as it is."""
 
 
 class _Layout:
-    """The lines so far. Each method adds those of one part of the document."""
+    """The lines so far. Each method adds the lines of one part of the document."""
 
     def __init__(self, source: Source, root: Node, anchors: MappingType[int, str]) -> None:
         self._source = source
@@ -116,7 +116,7 @@ class _Layout:
         self._bare = set(_bare_dashes(source, root))
 
     def head(self) -> None:
-        """Comments at the top of the file, with a blank line behind them, stay at the top."""
+        """Add comments at the top of the file that have a blank line behind them."""
         lines = self._source.lines
         end = next((at for at, line in enumerate(lines) if not line.startswith("#")), len(lines))
         if not self._ignores.isdisjoint(range(end + 1)):
@@ -128,7 +128,7 @@ class _Layout:
     def mapping(
         self, node: Mapping, indent: int, shapes: MappingType[str, Shape | None], lead: str = ""
     ) -> None:
-        """A block mapping; `lead` stands before its first key (the dash of a list's item)."""
+        """Add a block mapping; `lead` stands before its first key (the dash of a list's item)."""
         for at, (key, value) in enumerate(_in_order(node, shapes)):
             before = " " * (indent - len(lead)) + lead if at == 0 else " " * indent
             if at or not lead:
@@ -150,7 +150,7 @@ class _Layout:
             self._value(head, value, key.line, indent, shape)
 
     def _opening(self, head: str, line: int, value: Node) -> None:
-        """The line above a block collection, with its anchor."""
+        """Add the line above a block collection, with its anchor."""
         anchor = self._anchor(value)
         if anchor:
             self._between(head, line, value)
@@ -165,7 +165,7 @@ class _Layout:
         self._trailing(node, indent)
 
     def _first_ignore(self, item: Node, shape: Shape | None) -> int:
-        """The line of an item, or of the first ignore above it that is about a key which moves."""
+        """Return the line of an item, or of the first ignore above it about a moving key."""
         line = at = item.line
         if not self._ignores or not isinstance(item, Mapping) or item.flow:
             return line
@@ -177,7 +177,7 @@ class _Layout:
         return line
 
     def _item(self, item: Node, indent: int, shape: Shape | None, lead: str) -> None:
-        """An item of a block list; `lead` is its dash, behind those of lists around it."""
+        """Add an item of a block list; `lead` is its dash, behind those of lists around it."""
         start = " " * (indent + _STEP - len(lead)) + lead.rstrip()
         if isinstance(item, Mapping) and not item.flow and item.pairs:
             shapes = _shapes_of(item, shape)
@@ -197,7 +197,7 @@ class _Layout:
             self._value(start, item, item.line, indent, shape)
 
     def _value(self, head: str, value: Node, line: int, indent: int, shape: Shape | None) -> None:
-        """A scalar, an alias or a flow collection behind a key or a dash."""
+        """Add a scalar, an alias or a flow collection behind a key or a dash."""
         self._between(head, line, value)
         if isinstance(value, Alias):
             self._put(f"{head} *{value.name}", line, value.line)
@@ -211,7 +211,7 @@ class _Layout:
             self._put(f"{head} {self._flow(value, shape)}", line, value.line, value.end_line)
 
     def _as_written(self, value: Node) -> bool:
-        """Whether a flow collection has to keep its lines: for a comment or a text over several."""
+        """Return whether a flow collection keeps its lines, for a comment or a longer text."""
         if any(at in self._behind or at in self._alone for at in range(value.line, value.end_line)):
             return True
         return any(scalar.line != scalar.end_line for scalar in scalars_of(value))
@@ -235,7 +235,7 @@ class _Layout:
         return f"{anchor}{{{', '.join(parts)}}}"
 
     def _block(self, head: str, value: Scalar, line: int, indent: int) -> None:
-        """A text behind | or >: its lines keep what they have beyond the margin."""
+        """Add a text behind | or >: its lines keep their own indentation beyond the margin."""
         header = block_header(value, self._source)
         if any(char.isdigit() for char in header):
             raise FormatError(f"line {value.line}: a block text that gives its own indentation")
@@ -256,7 +256,7 @@ class _Layout:
             self._lines.append(" " * (indent + _STEP) + kept if kept else "")
 
     def _verbatim(self, head: str, value: Node, line: int, indent: int) -> None:
-        """What is over several lines and stays there; only how far they are indented changes."""
+        """Add a value over several lines as it is written; only the indentation changes."""
         lines = [self._source.line(at) or "" for at in range(value.line, value.end_line + 1)]
         lines[-1] = lines[-1][: value.end_column - 1]
         if isinstance(value, Scalar):
@@ -273,7 +273,7 @@ class _Layout:
         self._put(" " * (indent + _STEP) + rest[-1][margin:], value.end_line)
 
     def _raw(self, scalar: Scalar) -> str:
-        """A scalar of one line as it was written, with its anchor."""
+        """Return a scalar of one line as it is written, with its anchor."""
         line = self._source.line(scalar.line) or ""
         return line[scalar.column - 1 : scalar.end_column - 1]
 
@@ -282,7 +282,7 @@ class _Layout:
         return "" if name is None else f" &{name}"
 
     def _leading(self, line: int, indent: int) -> None:
-        """The comments and the blank line that stand directly before a line."""
+        """Add the comments and the blank line that stand directly before a line."""
         block: list[str] = []
         at = line - 1
         while at > 0 and at not in self._used:
@@ -305,13 +305,13 @@ class _Layout:
         self._lines += block
 
     def _trailing(self, node: Node, indent: int) -> None:
-        """The comments at the end of a block."""
+        """Add the comments at the end of a block."""
         for _, text in self._ends.get(id(node), ()):
             if text or self._lines[-1]:
                 self._lines.append(" " * indent + text if text else "")
 
     def _put(self, text: str, *lines: int) -> None:
-        """A line, with the last comment that stood behind what is on it; others go above it."""
+        """Add a line with the last comment behind its parts; other comments go above the line."""
         comments = [one for one in map(self._take, dict.fromkeys(lines)) if one is not None]
         indent = " " * _indent(text)
         self._lines += [indent + comment.text for comment in comments[:-1]]
@@ -321,27 +321,27 @@ class _Layout:
         self._lines.append(text)
 
     def _between(self, head: str, line: int, value: Node) -> None:
-        """The comments between a key and its value, if that begins further down: above the key."""
+        """Add the comments between a key and a value that begins further down: above the key."""
         if any(at in self._alone for at in range(line + 1, value.line)):
             self._put_above(head, line)
         if value.line > line:
             self._leading(value.line, _indent(head))
 
     def _put_above(self, head: str, line: int) -> None:
-        """A comment behind a key whose value begins on a later line."""
+        """Add, above a key, the comment behind it, where the value begins on a later line."""
         comment = self._take(line)
         if comment is not None:
             self._lines.append(" " * _indent(head) + comment.text)
 
     def _take(self, line: int) -> Comment | None:
-        """The comment behind something on a line, once."""
+        """Take the comment of a line, once."""
         if line in self._used or line not in self._behind:
             return None
         self._used.add(line)
         return self._behind[line]
 
     def finish(self) -> str:
-        """The text; comments at the end of the file stay there. Raises FormatError for others."""
+        """Return the text, with the last comments at its end. Raises FormatError for others."""
         last = max((at for at, line in enumerate(self._source.lines, 1)
                     if line.strip() and at not in self._alone), default=0)  # fmt: skip
         left = [one for one in (*self._behind.values(), *self._alone.values())
@@ -353,7 +353,7 @@ class _Layout:
 
 
 def _bare_dashes(source: Source, root: Node) -> Iterator[int]:
-    """The lines that hold nothing but the dash of an item that begins further down."""
+    """Yield the lines with nothing but the dash of an item that begins further down."""
     nodes = (node for node in walk(root) if not isinstance(node, Listing) or node.flow)
     starts = {node.line for node in nodes}
     for number, line in enumerate(source.lines, 1):
@@ -366,15 +366,15 @@ def _indent(text: str) -> int:
 
 
 def _trimmed(text: str) -> str:
-    """Without spaces at the end, but where a backslash makes them count."""
+    """Return a text without spaces at the end, but where a backslash makes them count."""
     trimmed = text.rstrip()
     return text if trimmed.endswith("\\") else trimmed
 
 
 def _shapes_of(node: Mapping, shape: Shape | None) -> MappingType[str, Shape | None]:
-    """The form of what stands under each key of a mapping, in the order that the model has.
+    """Return the form of the value under each key of a mapping, in the order of the model.
 
-    Keys that it does not know stay where they are, behind the others.
+    Keys that the model does not know stay in their order, behind the others.
     """
     names = [key.text for key, _ in node.pairs]
     if shape is NODE or isinstance(shape, ConditionOrNode):
@@ -389,7 +389,7 @@ def _shapes_of(node: Mapping, shape: Shape | None) -> MappingType[str, Shape | N
 
 
 def _node_shapes(names: list[str]) -> MappingType[str, Shape | None]:
-    """The keys of a node: its kind or its action first, what it holds last."""
+    """Return the keys of a node with their forms: its kind or action first, its children last."""
     kinds = [name for name in names if name in KINDS]
     if "child" not in names:  # settings of an action, then
         kinds = [name for name in kinds if name not in ACTION_KEYS]
@@ -411,19 +411,19 @@ def _node_shapes(names: list[str]) -> MappingType[str, Shape | None]:
 
 
 def _forms(keys: MappingType[str, Key]) -> dict[str, Shape | None]:
-    """The form of each key, in their order."""
+    """Return the form of each key, in their order."""
     return {name: key.shape for name, key in keys.items()}
 
 
 def _item_shape(shape: Shape | None) -> Shape | None:
-    """The form of a list's items."""
+    """Return the form of a list's items."""
     if shape is NODES:
         return NODE
     return shape.item if isinstance(shape, ListOf) else None
 
 
 def _in_order(node: Mapping, order: Iterable[str]) -> list[tuple[Scalar, Node]]:
-    """The pairs of a mapping; those whose keys `order` lacks stay behind the others."""
+    """Return the pairs of a mapping; pairs whose keys `order` lacks stay behind the others."""
     rank = {name: at for at, name in enumerate(order)}
     return sorted(node.pairs, key=lambda pair: rank.get(pair[0].text, len(rank)))
 
@@ -431,10 +431,10 @@ def _in_order(node: Mapping, order: Iterable[str]) -> list[tuple[Scalar, Node]]:
 def _trailing_comments(
     root: Node, source: Source, alone: MappingType[int, Comment], anchored: Container[int]
 ) -> dict[int, list[tuple[int, str]]]:
-    """The comments and blank lines at the end of blocks, with their lines, by the block's `id`.
+    """Return the comments and blank lines at the end of blocks, by the block's `id`.
 
-    They belong to a block where they are indented as what is in it. A comment that silences a
-    warning belongs to what follows it, however it is indented.
+    A comment belongs to a block with the same indentation. A comment that silences a warning
+    belongs to the line that follows it, at any indentation.
     """
     found: dict[int, list[tuple[int, str]]] = {}
     taken: set[int] = set()
@@ -447,7 +447,7 @@ def _trailing_comments(
 
 
 def _blocks(root: Node, anchored: Container[int]) -> Iterator[tuple[Mapping | Listing, int]]:
-    """The block collections below the root, each behind what it is in, with their columns."""
+    """Yield the block collections below the root, outer ones first, with their columns."""
     stack = [root]
     while stack:
         node = stack.pop()

@@ -1,7 +1,7 @@
-"""The kinds of nodes, a file each (or a few that differ by a word). Importing this fills `KINDS`.
+"""The kinds of nodes, a file each (or a few that differ by a word). Their import fills `KINDS`.
 
-A file says how its kind is read, checked and built; `language/kinds.py` says what a kind is. What
-builds a node imports its behaviour when it is called: reading and checking need none.
+A file says how its kind is read, checked and built; `language/kinds.py` says what a kind is. A
+kind's build imports the behaviour when a node is built: reading and checking need none.
 """
 
 from bt_actions.document.kinds.composites import if_, in_turn, parallel, pipeline

@@ -1,7 +1,7 @@
-"""What kinds are written with and may not import: types for annotations, and what builds nodes.
+"""Names for the files of kinds, which must not import them: types for annotations, and behaviours.
 
-Reading and checking are to import no behaviour. So a module here is imported when a kind's `build`
-first takes something out of it, and at run time the types say nothing.
+Reading and checking are to import no behaviour. So a module is imported here when a kind's `build`
+first takes something out of it, and the types say nothing at run time.
 """
 
 from importlib import import_module

@@ -1,4 +1,4 @@
-"""Kinds of one's own, that a tree declares under `kinds`: by how many children they hold."""
+"""Kinds that a tree declares under `kinds`, by the children that they hold."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -21,7 +21,7 @@ from bt_actions.utilities.suggest import did_you_mean
 
 
 def _build(node: TreeNode, context: Context, *children: Behaviour) -> Behaviour:
-    """What cannot be made is reported to the document's source, and `Failure` stands for it."""
+    """Make a behaviour; report a failure to the document's source, and return `Failure` instead."""
     from bt_actions.document.language.classes import ClassError, make_behaviour
 
     values = context.document.kinds[node.key.text].values

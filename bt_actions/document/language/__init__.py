@@ -1,4 +1,4 @@
 """The language of trees: its kinds and keys, the forms of values, and their types.
 
-Reading, checking, the JSON Schema and docs/yaml.md are made from it. Knows no document.
+Reading, checking, the JSON Schema and docs/yaml.md are made from this room. Knows no document.
 """

@@ -1,6 +1,6 @@
-"""A user's own behaviour class by its name, whether arguments fit it, and one made of it.
+"""A user's own behaviour class: found by its name, its arguments checked, an instance made.
 
-The module and the constructor are foreign code: whatever they raise becomes a `ClassError`.
+Module and constructor are foreign code: whatever they raise becomes a `ClassError`.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from bt_actions.utilities.plain_text import raised
 from bt_actions.utilities.suggest import did_you_mean, listing
 
 Python = bool | Collection[str]
-"""Which classes a tree may name: all, none, or those of some packages."""
+"""The classes that a tree may name: all, none, or those of some packages."""
 
 _PATH = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)+", re.ASCII)
 
 
 class ClassError(ValueError):
-    """There is no such class, or it is no behaviour, or none can be made of it."""
+    """No such class, a class that is no behaviour, or one that fails to make an instance."""
 
 
 class Misfit(NamedTuple):
-    """What does not fit a constructor: the argument (or an empty text), and why."""
+    """An argument that does not fit a constructor ("" for none in particular), and the reason."""
 
     name: str
     text: str
@@ -39,7 +39,7 @@ class Misfit(NamedTuple):
 
 
 def refusal(path: object, python: Python) -> str:
-    """Why a ``python:`` node may not name this class, before anything is imported; or ""."""
+    """Say why a ``python:`` node may not name this class, before any import; or ""."""
     if python is True:
         return ""
     if python is False:
@@ -51,7 +51,7 @@ def refusal(path: object, python: Python) -> str:
 
 
 def find_behaviour(path: str) -> type[Behaviour]:
-    """The class that ``package.module.Class`` names. Imports its module. Raises ClassError."""
+    """Import a module and return its class, by ``package.module.Class``. Raises ClassError."""
     if not _PATH.fullmatch(path):
         raise ClassError(f"{path!r} names no class: it is written package.module.Class")
     module_name, _, name = path.rpartition(".")
@@ -82,7 +82,7 @@ def _not_imported(module_name: str, error: BaseException) -> str:
 
 
 def make_behaviour(path: str, name: str, arguments: Mapping[str, object]) -> Behaviour:
-    """A behaviour of the class that `path` names; a text stands for the member of an enum.
+    """Make a behaviour of the class that `path` names; a text stands for the member of an enum.
 
     Raises ClassError.
     """
@@ -103,9 +103,9 @@ def make_behaviour(path: str, name: str, arguments: Mapping[str, object]) -> Beh
 
 
 def wrong_arguments(cls: type[Behaviour], arguments: Mapping[str, object]) -> Iterator[Misfit]:
-    """What keeps the constructor from taking the arguments.
+    """Yield what keeps the constructor from taking the arguments.
 
-    What is missing is told when nothing else is wrong: it may be there under another name.
+    A missing argument is told where nothing else is wrong: it may be there under another name.
     """
     parameters = _parameters(cls)
     if parameters is None:
@@ -143,7 +143,7 @@ def _misfit(
     *,
     takes_any: bool,
 ) -> Misfit | None:
-    """What is wrong with one argument."""
+    """Return what is wrong with one argument."""
     if name == "name":
         return Misfit(name, "the name is given as the node's 'name'")
     if name not in named:
@@ -161,7 +161,7 @@ def _misfit(
 
 
 def _parameters(cls: type[Behaviour]) -> Mapping[str, inspect.Parameter] | None:
-    """The parameters of a constructor, their types resolved where that is possible."""
+    """Return the parameters of a constructor, their types resolved where that is possible."""
     try:
         parameters = inspect.signature(cls).parameters
     except (TypeError, ValueError):
@@ -171,7 +171,7 @@ def _parameters(cls: type[Behaviour]) -> Mapping[str, inspect.Parameter] | None:
 
 
 def _resolved(parameter: inspect.Parameter, names: dict[str, object]) -> inspect.Parameter:
-    """A parameter whose type is no text; as it is where that cannot be told."""
+    """Resolve a parameter whose type is a text; return it unchanged where that fails."""
 
     def alone() -> None:
         pass
@@ -187,8 +187,7 @@ def _resolved(parameter: inspect.Parameter, names: dict[str, object]) -> inspect
 
 
 def _type_of(parameter: inspect.Parameter | None) -> object:
-    """The type that a parameter is annotated with, or that of its default where that is a member
-    of an enum."""
+    """Return the annotated type of a parameter, or the enum that its default is a member of."""
     if parameter is None:
         return inspect.Parameter.empty
     bare = parameter.annotation is parameter.empty and isinstance(parameter.default, Enum)
@@ -196,7 +195,7 @@ def _type_of(parameter: inspect.Parameter | None) -> object:
 
 
 def _meant(annotation: object, value: object) -> object:
-    """A value as the annotated type has it: the members of enums in the places of their names."""
+    """Convert a value to the annotated type: members of enums replace their names."""
     parts = typing.get_args(annotation)
     if typing.get_origin(annotation) in (typing.Union, types.UnionType):
         taken = next((part for part in parts if _takes(part, value)), None)
@@ -212,8 +211,7 @@ def _meant(annotation: object, value: object) -> object:
 
 
 def _member(kind: type[Enum], value: object) -> Enum | None:
-    """The member of a name, ``FAST`` or ``Mode.FAST``; of an enum of numbers or texts, also of a
-    value."""
+    """Return an enum's member by its name, ``FAST`` or ``Mode.FAST``, or by its number or text."""
     if isinstance(value, str):
         *before, name = value.split(".")
         if name in kind.__members__ and before[-1:] in ([], [kind.__name__]):
@@ -232,7 +230,7 @@ def _enums_in(annotation: object) -> Iterator[type[Enum]]:
 
 
 def _takes(annotation: object, value: object) -> bool:
-    """Whether a value is of the annotated type; what cannot be told is taken."""
+    """Return whether a value is of the annotated type, or the annotation does not tell."""
     if typing.get_origin(annotation) in (typing.Union, types.UnionType):
         return any(_takes(part, value) for part in typing.get_args(annotation))
     plain = typing.get_origin(annotation) or annotation
@@ -257,7 +255,7 @@ def _takes(annotation: object, value: object) -> bool:
 
 
 def _annotation(annotation: object) -> str:
-    """The type as its author reads it: without the modules of its parts."""
+    """Return a type as its author reads it: without the modules of its parts."""
     if isinstance(annotation, type):
         return annotation.__name__
     return re.sub(r"\b([A-Za-z_]\w*\.)+", "", str(annotation))

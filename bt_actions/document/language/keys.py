@@ -1,7 +1,7 @@
 """The keys of trees: at the top, beside actions, topics, inputs and outputs, each with its form.
 
-Which kinds of nodes there are is said in `document/kinds/`. Reading, checking, the JSON Schema and
-the reference (docs/yaml.md) are all made from these two.
+`document/kinds/` lists the kinds of nodes. Reading, checking, the JSON Schema and the reference
+(docs/yaml.md) are all made from these two.
 """
 
 from __future__ import annotations
@@ -105,9 +105,9 @@ GATES = keyed(
     Key("only_while", Condition(),
         "Leave the node out where this is false before any tick; what runs is stopped."),
 )  # fmt: skip
-"""What may stand beside every kind."""
+"""The keys beside every kind."""
 ACTION_KEYS = keyed(*DOING, *GATES.values())
-"""What may stand beside an action's alias."""
+"""The keys beside an action's alias."""
 ACTION_TYPE = Key("type", TypeName("action"), "The action's type.", required=True,
                   example="robot_control_interfaces/action/MoveRobot")  # fmt: skip
 ACTION_SERVER = RosName("the name of an action server")
@@ -184,7 +184,7 @@ _SHARED = (
 
 @dataclass(frozen=True)
 class _Nodes:
-    """What holds nodes of the tree; `reading/nodes.py` reads it, with the whole document."""
+    """A value that holds nodes of the tree, which `reading/nodes.py` reads."""
 
     words: str
     form: Schema
@@ -203,7 +203,7 @@ NODES: Shape = _Nodes("a list of nodes", {"type": "array", "minItems": 1, "items
 
 @dataclass(frozen=True, slots=True)
 class ConditionOrNode(Condition):
-    """A condition that an expression says, or a node: it succeeds, or fails."""
+    """A condition as an expression, or as a node that succeeds or fails."""
 
     words: str = "an expression or a node"
 
@@ -221,6 +221,6 @@ TOP_KEYS = keyed(
     *_SHARED,
     Key("root", NODE, "The root node.", required=True, example="{success: Done}"),
 )
-"""What may stand at the top of a tree."""
+"""The keys at the top of a tree."""
 LIBRARY_KEYS = keyed(_DESCRIPTION, _IMPORT, *_SHARED)
-"""What may stand at the top of a file that is only imported."""
+"""The keys at the top of a file that is only imported."""

@@ -1,4 +1,4 @@
-"""What a kind of node is: `Kind` holds all that reading, checking and building want to know of one.
+"""A kind of node: `Kind` holds all that reading, checking and building ask of one.
 
 The kinds stand in `document/kinds/`, a file each, which registers them in `KINDS`. A file makes its
 kind by `composite`, `decorator` or `leaf`, and names only those fields of `Kind` in which the kind
@@ -37,11 +37,11 @@ if TYPE_CHECKING:
     from bt_actions.messages.interfaces import Kind as InterfaceKind
 
 Settings = Mapping[str, object]
-"""What was read under each key of a node, the kind's own among them."""
+"""The values under the keys of a node, the kind's own key among them."""
 
 
 class Group(StrEnum):
-    """What py_trees calls the place of a node."""
+    """The group of a kind, in py_trees' words."""
 
     COMPOSITE = "composite"
     DECORATOR = "decorator"
@@ -49,7 +49,7 @@ class Group(StrEnum):
 
 
 class End(StrEnum):
-    """How a child ended."""
+    """The end of a child."""
 
     SUCCESS = "success"
     FAILURE = "failure"
@@ -69,11 +69,11 @@ SUCCEEDS = Can(True, False)
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """What a kind talks over: `name` is the key that names the server or the topic.
+    """The ROS interface of a kind: `name` is the key for the server or the topic.
 
-    `fields` is the key for the fields of what is sent, which are those of the part `sent` of the
-    interface; `root` is what expressions call the part `received`, and `more` what they may read
-    beside it, of types that nobody knows. `type` is the interface's, where no key says it.
+    `fields` is the key for the fields of the sent message, which is the interface's part `sent`.
+    `root` is the name of the part `received` in expressions; `more` are further names, of unknown
+    types. `type` is the interface's, where no key gives one.
     """
 
     kind: InterfaceKind
@@ -86,7 +86,7 @@ class Interface:
     type: str = ""
 
     def part(self, cls: Any, name: str) -> Any:
-        """The part of an interface's class; a message is its own."""
+        """Return a part of an interface's class; a message is its own part."""
         return getattr(cls, name) if name else cls
 
 
@@ -95,7 +95,7 @@ ACTION = Interface("action", "server", "goal", "Goal", "result", "Result")
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """A kind of node. `value` is the form of what stands behind the kind's own key."""
+    """A kind of node. `value` is the form of the value behind the kind's own key."""
 
     name: str
     group: Group
@@ -109,22 +109,22 @@ class Kind:
     The function imports the behaviour's class when it is called: checking is to stay quick.
     """
     reads: str
-    """The key whose value is computed before anything is done; the node fails without it."""
+    """The key whose value is computed before anything else; without a value the node fails."""
     interface: Interface | None = None
     check: Callable[..., None] | None = None
-    """Reports, of a Checker and a node, what is wrong beyond the forms of its keys."""
+    """Reports, of a Checker and a node, what is wrong beyond the forms of the keys."""
     warn: Callable[..., None] | None = None
     """Reports hazards, of Hazards, a node, and whether a timeout around the node bounds it."""
     ends: Callable[[Settings, list[Can], bool], Can] = lambda _values, _inner, _at_once: EITHER
-    """How a node can end, from how its children can; if `True`, in the tick in which it begins."""
+    """How a node can end, from how its children can; with `True`, in the tick of its begin."""
     seconds: Callable[[Settings, list[float]], float] = lambda _values, inner: max(inner)
     """The seconds of all deadlines and pauses of a node, from those of its children."""
     writes: Callable[[Settings], Iterable[tuple[str, str, object, str | None]]] | None = None
-    """Variables that a node writes, if not by `save`: name, key, value, and the value's root."""
+    """Variables that a node writes without `save`: name, key, value, and the value's root."""
     begun: bool = False
-    """Whether a node takes time whenever it is begun."""
+    """Whether a node takes time at each begin."""
     slow: bool | str = False
-    """Whether a node may take time by itself; a text names the key with which it may."""
+    """Whether a node may take time by itself; a text names the key that makes it slow."""
     goes_on: End | None = None
     """The end of a child after which a composite ticks the next, and a decorator succeeds."""
     again: End | None = None
@@ -132,13 +132,13 @@ class Kind:
     once: bool = False
     """Whether the child is never begun anew after its end."""
     bounds: bool = False
-    """Whether the child is stopped after some time."""
+    """Whether the node stops its child after some time."""
     paces: bool = False
-    """Whether the child is held back after a success, in this visit of the node above."""
+    """Whether the node holds its child back after a success, in this visit of the parent."""
     computes: bool = False
-    """Whether a missing value is nearly all that a node fails for."""
+    """Whether a node fails for hardly anything but a missing value."""
     semantics: str = ""
-    """Rows of a table in Markdown, with a head, that say what a node does when."""
+    """Rows of a table in Markdown, with a head: the node's behaviour in each case."""
     includes: bool = False
     """Whether a node stands for another tree, and saves its outputs however that tree ends."""
 
@@ -149,12 +149,12 @@ class Kind:
 
     @cached_property
     def needs(self) -> tuple[Key, ...]:
-        """The keys that must be there."""
+        """The required keys."""
         return required_in(self.keys)
 
     @cached_property
     def holds(self) -> tuple[str, ...]:
-        """The keys that hold nodes, in the order of the children; one may be its own."""
+        """The keys that hold nodes, in the order of the children; the kind's own may be one."""
         own = (self.name,) if isinstance(self.value, ConditionOrNode) else ()
         return own + tuple(name for name, key in self.keys.items() if key.shape in (NODE, NODES))
 
@@ -191,22 +191,22 @@ _CHILDREN = Key("children", NODES, "The nodes it holds.", required=True,
 _CHILD = Key("child", NODE, "The node it holds.", required=True, example="{success: Done}")
 
 KINDS: dict[str, Kind] = {}
-"""Every kind of node, by its key; filled by `document/kinds/`, and never changed meanwhile."""
+"""Every kind of node, by its key; `document/kinds/` fills the table once, at its import."""
 OWN_KINDS: dict[str, Kind] = {}
-"""What a kind that a tree declares is made of, by the children that it holds."""
+"""The kinds behind kinds that a tree declares, by the children that these hold."""
 NODE_KEYS = {*ACTION_KEYS, "child", "children"}
-"""All that may stand in a node beside its kind, and so names no action.
+"""All keys of a node beside its kind: no action may have such a name.
 
-Other keys that hold nodes may: beside a kind that has such a key, the word is that key.
+Other keys that hold nodes may name an action. Beside a kind with such a key, the word is the key.
 """
 SINCE = dict.fromkeys(
     ("if", "pipeline", "every", "in_turn", "on_change", "save_on_failure", *GATES), "0.2"
 )
-"""The version of bt_actions since which a word may name no action, where not from the beginning."""
+"""The version of bt_actions since which a word may name no action, where that is not the first."""
 
 
 def register(*kinds: Kind) -> None:
-    """Add kinds to the language. Raises ValueError for a name that one has."""
+    """Add kinds to the language. Raises ValueError for a name that is taken."""
     for kind in kinds:
         if kind.name in KINDS:
             raise ValueError(f"there is a kind {kind.name!r} already")
@@ -218,7 +218,7 @@ def register(*kinds: Kind) -> None:
 
 
 def composite(name: str, doc: str, example: str, *keys: Key, **more: Any) -> Kind:
-    """A kind that holds a list of nodes."""
+    """Make a kind that holds a list of nodes."""
     own = keyed(_CHILDREN, *keys)
     return Kind(name, Group.COMPOSITE, NodeName(), doc, own, example, reads=name, **more)
 
@@ -226,20 +226,20 @@ def composite(name: str, doc: str, example: str, *keys: Key, **more: Any) -> Kin
 def decorator(
     name: str, doc: str, example: str, *keys: Key, value: Shape | None = None, **more: Any
 ) -> Kind:
-    """A kind that holds one node. The first of its keys says how often, or how long."""
+    """Make a kind that holds one node. The first key says how often, or how long."""
     own = keyed(_CHILD, *keys, *(() if value is None else (NAME,)))
     reads, form = keys[0].name if keys else name, value or NodeName()
     return Kind(name, Group.DECORATOR, form, doc, own, example, reads=reads, **more)
 
 
 def leaf(name: str, value: Shape, doc: str, example: str, *keys: Key, **more: Any) -> Kind:
-    """A kind that holds nothing; it reads what it sends, or what stands behind its key."""
+    """Make a kind without children, which reads the fields it sends or the value behind its key."""
     own = keyed(*keys, *(() if isinstance(value, NodeName) else (NAME,)))
     more.setdefault("reads", more["interface"].fields if "interface" in more else name)
     return Kind(name, Group.LEAF, value, doc, own, example, **more)
 
 
 def own_kind(name: str, children: str) -> Kind:
-    """A kind that a tree declares; `children` are none, one or many."""
+    """Make a kind that a tree declares; `children` are none, one or many."""
     made = OWN_KINDS.get(children, OWN_KINDS["none"])
     return replace(made, name=name, keys={**made.keys, **GATES})

@@ -1,7 +1,7 @@
 """The form of ROS names: of topics, servers and namespaces, as `rcl` takes them.
 
-The rules are those of `rcl_validate_topic_name` and `rmw_validate_full_topic_name`; they are
-checked here so that a tree is found wrong before it runs, and without ROS.
+The rules are those of `rcl_validate_topic_name` and `rmw_validate_full_topic_name`. This file has
+them, too, so that a tree is found wrong before it runs, and without ROS.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from bt_actions.document.yaml.source import Source
 
 LONGEST = 120
 LONGEST_NAMESPACE = 100
-"""Characters. In ROS both have 247, with the 20 that an action adds to its name."""
+"""Characters. ROS allows 247 for namespace and name, with the 20 that an action adds to them."""
 
 _PART = r"(?:[A-Za-z0-9_]|\{(?:node|ns|namespace)\})"
 _TOKEN = rf"(?![0-9]){_PART}+"
@@ -33,7 +33,7 @@ _BRACES = re.compile(r"\{[^{}]*\}?|\}")
 class RosName:
     """A name that ROS takes; a `namespace` may be empty, and end with a slash.
 
-    Inputs of the tree may stand in it as `$(name)`: they are put in when a tree is made.
+    Inputs of the tree may stand in the name as `$(name)`: their values come in when a tree is made.
     """
 
     words: str
@@ -65,12 +65,12 @@ class RosName:
 
 
 def why_not(name: str) -> str:
-    """What keeps a text from being the name of a topic or server; empty where nothing does."""
+    """Say what keeps a text from being the name of a topic or server; "" for nothing."""
     return "" if re.fullmatch(_NAME, name) and len(name) <= LONGEST else _why(name, LONGEST)
 
 
 def _why(text: str, longest: int) -> str:
-    """What ROS would refuse in a name."""
+    """Say what ROS would refuse in a name."""
     if not text:
         return "it is empty"
     if len(text) > longest:

@@ -1,7 +1,7 @@
 """The forms of single values: texts, names, numbers, durations, choices, expressions, type names.
 
-Each reports what is wrong to the source and then gives BAD; it knows nothing of the rest. What all
-forms have in common stands first: the protocol, and how wrong forms are reported.
+A form reports mistakes to the source and then gives BAD; a form knows nothing else of the document.
+The file begins with the parts that all forms share: the protocol, and the report of a wrong form.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from bt_actions.utilities.units import DURATION_UNITS, parse_duration
 
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _MARKED = re.compile(r"\$(?:[({]+\s*)?[A-Za-z_]")
-"""A variable as a text or an expression holds it, or as other tools write one."""
+"""A variable in a text or an expression, also in the notation of other tools."""
 GREATEST = sys.float_info.max
 _NAME_LIMIT = 200
 Schema = dict[str, object]
@@ -39,17 +39,17 @@ class Shape(Protocol):
 
     @property
     def words(self) -> str:
-        """What is needed, as a message and the reference say it: ``a duration, such as 5 s``."""
+        """The form in words, for messages and the reference: ``a duration, such as 5 s``."""
 
     def read(self, node: Node, source: Source) -> object:
-        """The value, or BAD after reporting what is wrong."""
+        """Return the value, or BAD after a report."""
 
     def schema(self) -> Schema:
-        """JSON Schema for it."""
+        """Return the JSON Schema of the form."""
 
 
 def words_for(node: Node) -> str:
-    """What a node is, as a message says it."""
+    """Say what a node is, for a message."""
     if isinstance(node, Mapping):
         return "a mapping"
     if isinstance(node, Listing):
@@ -82,12 +82,12 @@ def wrong_form(shape: Shape, node: Node, source: Source, *, hint: str | None = N
 
 
 def is_computed(node: Node) -> bool:
-    """Whether a node is `$name` or computed."""
+    """Return whether a node is `$name` or computed."""
     return isinstance(node, Scalar) and node.text.startswith(("$", "= "))
 
 
 def read_computed(shape: Shape, node: Node, source: Source) -> object:
-    """What is computed in the place of a value of a form; a text with `$(name)` in it is not."""
+    """Return the computed value in place of a form; a text with `$(name)` in it is not one."""
     value = read_value(node, source)
     if value is BAD or isinstance(value, Computed):
         return value
@@ -98,7 +98,7 @@ def read_computed(shape: Shape, node: Node, source: Source) -> object:
 
 
 def _or_variable(schema: Schema, values: bool) -> Schema:
-    """A schema that lets a variable stand for the value, where `values` says so."""
+    """Return a schema that also lets a variable stand for the value, where `values` says so."""
     if not values:
         return schema
     return {"anyOf": [schema, {"type": "string", "pattern": r"^(\$[A-Za-z_]|= )"}]}
@@ -126,7 +126,7 @@ class Text:
 
 @dataclass(frozen=True, slots=True)
 class NodeName:
-    """The name of a node; `optional` where the kind itself says enough."""
+    """The name of a node; `optional` where the kind itself names the node well enough."""
 
     optional: bool = False
     words: str = "a name"
@@ -170,7 +170,7 @@ class NodeName:
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """A word that is a name in this document: of an input, a variable, an action."""
+    """A word that names a thing in this document: an input, a variable, an action."""
 
     words: str = "a name of letters, digits and underscores"
 
@@ -194,7 +194,7 @@ class Name:
 
 
 def _odd(text: str) -> str | None:
-    """What to call the first character of a text that nobody sees."""
+    """Name the first character of a text that nobody sees."""
     if text.isprintable():
         return None
     return next(spoken(char) for char in text if not char.isprintable())
@@ -337,7 +337,7 @@ class Choice:
         return f"one of {', '.join(self.options)}"
 
     def read(self, node: Node, source: Source, words: str = "") -> object:
-        """`words` say what else may stand here, too."""
+        """Return the word; `words` say what else may stand here."""
         if not isinstance(node, Scalar):
             return wrong_form(self, node, source)
         if node.text in self.options:

@@ -1,7 +1,7 @@
 """The forms of values with parts: lists, tables, records, data with variables in it.
 
-`keys.py` and `kinds.py` say which key has which form. A form reports what is wrong to the source
-and then gives BAD; it knows nothing of the rest of the document.
+`keys.py` and `kinds.py` give each key its form. A form reports mistakes to the source and then
+gives BAD; a form knows nothing else of the document.
 """
 
 from __future__ import annotations
@@ -144,12 +144,12 @@ class Key:
 
     @property
     def hint(self) -> str:
-        """What to write where the key is missing."""
+        """The words to write where the key is missing."""
         return f"{self.doc.removesuffix('.')}, such as {self.name}: {self.example}"
 
 
 def required_in(keys: MappingType[str, Key]) -> tuple[Key, ...]:
-    """The keys that must be there."""
+    """Return the required keys."""
     return tuple(key for key in keys.values() if key.required)
 
 
@@ -209,9 +209,9 @@ def read_keys(
     source: Source,
     elsewhere: Container[str] = (),
 ) -> dict[str, object]:
-    """The values of a mapping's keys; unknown and missing ones are reported.
+    """Read the values of a mapping's keys, and report unknown and missing keys.
 
-    Those that are read `elsewhere` are left out.
+    Keys that are read `elsewhere` are left out.
     """
     values: dict[str, object] = {}
     unknown = False
@@ -240,7 +240,7 @@ def read_keys(
 def report_unknown_key(
     key: Scalar, known: MappingType[str, object], source: Source, hint: str | None = None
 ) -> None:
-    """Report a key that cannot stand where it stands; `hint` says what to do instead, if known."""
+    """Report a key that cannot stand in its place; `hint` says what to do instead, if known."""
     here, instead = key_here(key.text, known) if hint is None else (None, hint)
     near = f"; here it is '{here}'" if here else ""
     if not near and not instead:
@@ -251,7 +251,7 @@ def report_unknown_key(
 
 
 def keys_schema(keys: MappingType[str, Key]) -> Schema:
-    """JSON Schema for a mapping with known keys."""
+    """Return the JSON Schema of a mapping with known keys."""
     schema: Schema = {
         "type": "object",
         "additionalProperties": False,

@@ -1,6 +1,7 @@
-"""Types as a tree names them (`float64`, `string[]`, `geometry_msgs/msg/Pose`), and what fits what.
+"""Types by the names of the language (`float64`, `string[]`, `geometry_msgs/msg/Pose`), and which
+type fits which.
 
-Needs no ROS for the plain types; a message's type is looked up only where types are checked.
+Plain types need no ROS; the type of a message is looked up only where types are checked.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _STAND_FOR = {
     "builtin_interfaces/msg/Time": (*FLOATS, *INTEGERS),
     DURATION: (*FLOATS, *INTEGERS, "string"),
 }
-"""The plain types whose values may be given for a message: seconds, and `500 ms`."""
+"""The plain types whose values may stand for a message: seconds, and `500 ms`."""
 _TEXT = Scalar("string")
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _KINDS = ("action", "srv", "msg")
@@ -39,11 +40,11 @@ _SYNTAX = re.compile(r"([A-Za-z][A-Za-z0-9_/]*)(?:<=(\d{1,9}))?(?:\[(?:(<=)?(\d{
 
 @dataclass(frozen=True, slots=True)
 class Record(FieldType):
-    """A mapping that a tree writes out: its keys, with their types where they are known."""
+    """A mapping written in a tree: its keys, with their types where these are known."""
 
     items: tuple[tuple[str, FieldType | None], ...]
     sometimes: frozenset[str] = frozenset()
-    """Keys that not every one of several mappings has."""
+    """Keys that some of several mappings lack."""
 
     def __str__(self) -> str:
         return "mapping"
@@ -51,7 +52,7 @@ class Record(FieldType):
 
 @dataclass(frozen=True, slots=True)
 class Either(FieldType):
-    """One of several types: that of an item of a list that a tree writes out."""
+    """One of several types: of an item of a list written in a tree."""
 
     kinds: tuple[FieldType, ...]
 
@@ -60,7 +61,7 @@ class Either(FieldType):
 
 
 class TypeNameError(ValueError):
-    """A text that names no type; `missing` is True for one that may be installed elsewhere."""
+    """A text that names no type; `missing` where the type may be installed elsewhere."""
 
     def __init__(self, message: str, *, missing: bool = False) -> None:
         super().__init__(message)
@@ -68,9 +69,9 @@ class TypeNameError(ValueError):
 
 
 def parse_type(text: str, *, types: bool = True) -> FieldType | None:
-    """The type a text names; None for a message's type when `types` is False.
+    """Return the type that a text names; None for a message's type when `types` is False.
 
-    Raises TypeNameError, which says what was meant or what is missing.
+    Raises TypeNameError, which says what is meant or what is missing.
     """
     match = _SYNTAX.fullmatch(text)
     listed = "[" in text
@@ -98,7 +99,7 @@ def _item(name: str, limit: int | None, types: bool) -> FieldType | None:
 
 
 def _instead(text: str, types: bool, near: str = "") -> str:
-    """What to write, for a word of elsewhere or, where nothing is `near`, an installed type."""
+    """Say what to write: for a foreign word or, where nothing is `near`, an installed type."""
     here = type_here(text)
     if here is None and not near and types:
         here = meant_type(text, "msg")
@@ -106,8 +107,10 @@ def _instead(text: str, types: bool, near: str = "") -> str:
 
 
 def meant_type(text: str, kind: Kind) -> str | None:
-    """What to write for an installed type that is named without its package, or as elsewhere:
-    ``Pose``, ``geometry_msgs.msg.Pose``, ``geometry_msgs/msg/pose``."""
+    """Say what to write for an installed type without its package, or in a foreign notation.
+
+    Examples are ``Pose``, ``geometry_msgs.msg.Pose`` and ``geometry_msgs/msg/pose``.
+    """
     from bt_actions.messages.interfaces import installed
 
     *before, short = [word for word in _WORD.findall(text) if word not in _KINDS] or [""]
@@ -122,7 +125,7 @@ def meant_type(text: str, kind: Kind) -> str | None:
 
 
 def interface_of(name: str, kind: Kind) -> type:
-    """The class of an interface. Raises TypeNameError."""
+    """Return the class of an interface. Raises TypeNameError."""
     from bt_actions.messages.interfaces import UnknownInterface, interface
 
     try:
@@ -132,7 +135,7 @@ def interface_of(name: str, kind: Kind) -> type:
 
 
 def fits(given: FieldType | None, wanted: FieldType | None) -> bool:
-    """Whether a value of one type can be put where another is needed; unknown types fit."""
+    """Return whether a value of one type can stand where another is needed; unknown types fit."""
     if given is None or wanted is None:
         return True
     if isinstance(given, Either):
@@ -157,7 +160,7 @@ def fits(given: FieldType | None, wanted: FieldType | None) -> bool:
 
 
 def _fits_size(given: Listing, wanted: Listing) -> bool:
-    """Whether a list can have as many items as are needed, as far as both are known."""
+    """Return whether a list can have the needed number of items, as far as both are known."""
     if given.size is None:
         return wanted.size is None or given.limit is None or given.limit >= wanted.size
     if wanted.size is not None:
@@ -166,7 +169,7 @@ def _fits_size(given: Listing, wanted: Listing) -> bool:
 
 
 def _fills(given: FieldType, cls: type) -> bool:
-    """Whether a value can stand where a message is needed; of a mapping, `misfits` says more."""
+    """Return whether a value can stand for a message; `misfits` says more of a mapping."""
     from bt_actions.messages.interfaces import interface_name
 
     if isinstance(given, Message):
@@ -177,7 +180,7 @@ def _fills(given: FieldType, cls: type) -> bool:
 
 
 def misfits(given: FieldType | None, wanted: FieldType | None) -> list[str]:
-    """What is wrong with mappings of such types where messages are needed, also inside lists.
+    """Say what is wrong with mappings of such types where messages are needed, also inside lists.
 
     Each text goes on where the name of the value ends: ".x: ...", ", in one item: ...".
     """
@@ -207,7 +210,7 @@ def misfits(given: FieldType | None, wanted: FieldType | None) -> list[str]:
 
 
 def _alone(given: Record) -> list[dict[str, FieldType | None]]:
-    """A mapping as what can stand beside each other: of several, one may have angles."""
+    """Split a mapping into parts whose keys can stand side by side: one part may have angles."""
     from bt_actions.messages.conveniences import ANGLES
 
     items = dict(given.items)

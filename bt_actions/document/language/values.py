@@ -1,11 +1,11 @@
-"""Values as they are written in a tree: literals, and what is computed when it is needed.
+"""Values in a tree: literals, and expressions that are computed on demand.
 
 A scalar that is just `$name` keeps its type; `= $a + 1` computes; `$(name)` stands inside a text;
 `$$` is a dollar sign. Nothing is evaluated here.
 
-A tree can double a value each time round (`set: {x: [$x, $x]}`). In memory both halves are one, and
-so nothing is noticed before the value is compared or made a text, which then takes for ever: hence
-the bounds. Messages and arrays are not looked into: they are as large as ROS has made them.
+A tree can double a value in each round (`set: {x: [$x, $x]}`). Both halves are one object, so the
+doubling costs nothing until the value is compared or made a text, which then takes for ever: hence
+the bounds. Messages and arrays are not looked into: ROS has bounded them.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ from bt_actions.expressions.values import MAX_ITEMS as MAX_TEXT
 from bt_actions.utilities.plain_data import numbers_only
 
 MAX_ITEMS = 1_000_000
-"""Numbers, texts, lists and mappings in one value, each counted as often as it can be reached."""
+"""Numbers, texts, lists and mappings in one value, each counted as often as a path leads to it."""
 MAX_CHARACTERS = 10_000_000
-"""Of all texts in one value."""
+"""Characters of all texts in one value."""
 MAX_LEVELS = 100
 """Lists and mappings inside each other."""
 _END = object()
@@ -50,7 +50,7 @@ Lookup = Callable[[str], object]
 
 
 class _Bad:
-    """Stands for a value that was already reported, so that nothing is reported after it."""
+    """The stand-in for a reported value: nothing more is reported of it."""
 
     def __repr__(self) -> str:
         return "BAD"
@@ -61,18 +61,18 @@ BAD: Final = _Bad()
 
 @dataclass(slots=True, eq=False)
 class Computed:
-    """A value that an expression gives when it is needed; `start` is its place in the scalar."""
+    """A value that an expression gives on demand; `start` is the place in the scalar."""
 
     expression: Expression
     node: Scalar
     start: int = 0
 
     def evaluate(self, variable: Lookup) -> object:
-        """The value. Raises ExpressionError."""
+        """Return the value. Raises ExpressionError."""
         return self.expression.evaluate({}, variable)
 
     def span(self, source: Source, start: int, end: int) -> Span:
-        """Where some columns of the expression are written."""
+        """Return the range of some columns of the expression in the text."""
         return inner_span(self.node, source, self.start + start, self.start + end)
 
 
@@ -84,7 +84,7 @@ class Interpolated:
     node: Scalar
 
     def evaluate(self, variable: Lookup) -> str:
-        """The text. Raises ExpressionError, also for one longer than an expression may make it."""
+        """Return the text. Raises ExpressionError, also for a text beyond an expression's bound."""
         texts, left = [], MAX_TEXT
         for part in self.parts:
             text = part if isinstance(part, str) else _as_text(part.evaluate(variable))
@@ -96,10 +96,10 @@ class Interpolated:
 
 
 def refuse_large(value: object, *, items: int = MAX_ITEMS, characters: int = MAX_CHARACTERS) -> int:
-    """Return how many items a value has.
+    """Return the number of items in a value.
 
-    Raises ValueError for one that is larger, or nested deeper than `MAX_LEVELS`. Takes no more time
-    than a value of the largest size.
+    Raises ValueError for a value that is larger, or nested deeper than `MAX_LEVELS`. Takes no more
+    time than a value of the largest size.
     """
     left = items
     stack: list[Iterator[object]] = [iter((value,))]
@@ -126,10 +126,10 @@ def refuse_large(value: object, *, items: int = MAX_ITEMS, characters: int = MAX
 
 
 def spoken(value: object, variable: Lookup) -> str:
-    """The text of a log, which has one whatever it reads.
+    """Return the text of a log, whatever the log reads.
 
-    `(no value)` stands for what cannot be computed, and the text ends with an ellipsis where it is
-    longer than an expression may make it.
+    `(no value)` stands for a part that cannot be computed. An ellipsis ends a text that is longer
+    than an expression may make.
     """
     text = ""
     for part in value.parts if isinstance(value, Interpolated) else (value,):
@@ -148,7 +148,7 @@ _DOLLAR = re.compile(r"\$\$|\$\(([^()$]*)\)|\$")
 
 
 def read_value(node: Node, source: Source) -> object:
-    """Plain data with `Computed` and `Interpolated` in it, or BAD after reporting what is wrong."""
+    """Return plain data with `Computed` and `Interpolated` in it, or BAD after a report."""
     if isinstance(node, Scalar):
         value = _read_scalar(node, source)
         if isinstance(value, Computed):
@@ -197,17 +197,17 @@ def _read_scalar(node: Scalar, source: Source) -> object:
 
 
 def _lacks_space(text: str) -> bool:
-    """Whether a text is an expression but for the space behind its '='."""
+    """Return whether a text is an expression but for the space behind its '='."""
     return text.startswith("=") and computes(text[1:])
 
 
 def names_value(text: str) -> bool:
-    """Whether a text stands for one value: ``$name``, ``$name.field.0``, ``$name[1:3]``."""
+    """Return whether a text stands for one value: ``$name``, ``$name.field.0``, ``$name[1:3]``."""
     return _VARIABLE.fullmatch(text) is not None
 
 
 def computes(text: str) -> bool:
-    """Whether a text is an expression."""
+    """Return whether a text is an expression."""
     try:
         _expression(text, frozenset())
     except ExpressionError:
@@ -216,15 +216,15 @@ def computes(text: str) -> bool:
 
 
 def names_file(text: str) -> bool:
-    """Whether a text stands for the data in a file: ``@points.yaml``."""
+    """Return whether a text stands for the data in a file: ``@points.yaml``."""
     return text.startswith("@") and text.endswith(SUFFIXES)
 
 
 def read_data(path: Path, *, pipes: bool = False) -> object:
-    """The data in a YAML or JSON file; a dollar sign means nothing in it.
+    """Return the data in a YAML or JSON file; a dollar sign has no meaning in the data.
 
-    Raises DocumentError, with the place in that file, and ValueError for what is larger than any
-    value of a tree. `pipes` as for `read_source`.
+    Raises DocumentError, with the place in that file, and ValueError for data larger than any value
+    of a tree. `pipes` has the meaning it has in `read_source`.
     """
     source = read_source(path, pipes=pipes)
     node = compose(source)
@@ -308,7 +308,7 @@ def _interpolated(node: Scalar, source: Source) -> object:
 def read_expression(
     node: Scalar, source: Source, text: str, start: int, roots: frozenset[str]
 ) -> Expression | None:
-    """The expression in a part of a scalar, or None after reporting what is wrong with it."""
+    """Return the expression in a part of a scalar, or None after a report."""
     try:
         return _expression(text, roots)
     except ExpressionError as error:
@@ -320,7 +320,7 @@ def read_expression(
 
 @lru_cache(maxsize=4096)
 def _expression(text: str, roots: frozenset[str]) -> Expression:
-    """An expression never changes, and a tree says the same thing in many places."""
+    """Return an expression, shared by all places with the same text: expressions never change."""
     return Expression(text, roots=roots, constants=_named_constant)
 
 
@@ -333,7 +333,7 @@ def _named_constant(name: str) -> object:
 
 
 def locate(node: Node, path: tuple[str | int, ...], *, at_key: bool = False) -> Node:
-    """The YAML node at a path inside another, or the nearest there is on the way."""
+    """Return the YAML node at a path inside another, or the last node on the way there."""
     for depth, step in enumerate(path):
         last = depth == len(path) - 1
         if isinstance(node, Mapping):
@@ -353,7 +353,7 @@ def locate(node: Node, path: tuple[str | int, ...], *, at_key: bool = False) -> 
 
 
 def computed_in(value: object) -> list[Computed]:
-    """Every computed part of a value, in the order it was written."""
+    """Return every computed part of a value, in the order of the text."""
     if isinstance(value, Computed):
         return [value]
     if isinstance(value, Interpolated):
@@ -366,7 +366,7 @@ def computed_in(value: object) -> list[Computed]:
 
 
 def constant_of(computed: Computed) -> object:
-    """The value of an expression over nothing but numbers and texts; None for any other."""
+    """Return the value of an expression over numbers and texts alone; None for any other."""
     expression = computed.expression
     if expression.variables or expression.form.roots or expression.form.constants:
         return None
@@ -377,7 +377,7 @@ def constant_of(computed: Computed) -> object:
 
 
 def resolve(value: object, variable: Lookup) -> object:
-    """The value with everything in it computed. Raises ExpressionError."""
+    """Return the value with all its parts computed. Raises ExpressionError."""
     if isinstance(value, (Computed, Interpolated)):
         return value.evaluate(variable)
     if isinstance(value, MappingType):

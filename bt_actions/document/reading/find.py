@@ -1,4 +1,4 @@
-"""Where trees are: a path, or the name of an installed tree."""
+"""The file of a tree: by a path, or by the name of an installed tree."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SEARCH_PATH = "BT_ACTIONS_TREE_PATH"
 
 
 class TreeNotFoundError(FileNotFoundError):
-    """There is no such tree; the text says what may be meant, `hint` where it was looked for."""
+    """No such tree; the text says what may be meant, and `hint` where trees were looked for."""
 
     def __init__(self, text: str, hint: str | None = None) -> None:
         super().__init__(text)
@@ -25,7 +25,7 @@ class TreeNotFoundError(FileNotFoundError):
 
 
 def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = None) -> Path:
-    """The file of a tree: a path, `package://pkg/trees/x.yaml`, or an installed tree's name.
+    """Return a tree's file: by path, `package://pkg/trees/x.yaml`, or an installed tree's name.
 
     A path is looked for beside `beside` (the folder of an including file) or in the current
     folder; a name then in `BT_ACTIONS_TREE_PATH`, in the checkout's own `trees/`, and in
@@ -55,7 +55,7 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
 
 
 def tree_folders() -> Iterator[Path]:
-    """The folders where trees are looked for by name, in order."""
+    """Yield the folders where trees are looked for by name, in order."""
     for entry in os.environ.get(_SEARCH_PATH, "").split(os.pathsep):
         if entry:
             yield Path(entry)
@@ -69,7 +69,7 @@ def tree_folders() -> Iterator[Path]:
 
 
 def tree_folder(place: str | os.PathLike[str]) -> Path:
-    """A folder of trees: a path, or `package://pkg/trees`. Raises TreeNotFoundError."""
+    """Return a folder of trees: a path, or `package://pkg/trees`. Raises TreeNotFoundError."""
     wanted = os.fspath(place)
     if not wanted.startswith("package://"):
         return Path(wanted)
@@ -80,7 +80,7 @@ def tree_folder(place: str | os.PathLike[str]) -> Path:
 
 
 def installed_trees() -> dict[str, Path]:
-    """Return every tree that can be named, with its file."""
+    """Return every tree that has a name, with its file."""
     found: dict[str, Path] = {}
     for folder in tree_folders():
         try:
@@ -102,7 +102,7 @@ def _prefixes() -> Iterator[Path]:
 
 
 def _packages(prefix: Path) -> list[str]:
-    """The packages of a prefix, from the ament index."""
+    """Return the packages of a prefix, from the ament index."""
     try:
         index = prefix / "share" / "ament_index" / "resource_index" / "packages"
         return sorted(entry.name for entry in index.iterdir())
@@ -111,7 +111,7 @@ def _packages(prefix: Path) -> list[str]:
 
 
 def _places(wanted: str) -> list[Path]:
-    """Where a place in a package may lie."""
+    """Return the paths that a place in a package may have."""
     package, _, inner = wanted.removeprefix("package://").partition("/")
     if not package or ".." in Path(inner).parts:
         return []
@@ -140,7 +140,7 @@ def _refuse_links(*places: Path) -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Whether a path leads to a file, as far as it can be asked."""
+    """Return whether a path leads to a file, as far as the system tells."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -148,7 +148,7 @@ def is_file(path: Path) -> bool:
 
 
 def _is_there(path: Path) -> bool:
-    """Whether something has this path, or nobody can tell: its name is too long, say."""
+    """Return whether something has this path, or the system cannot tell (a name too long)."""
     try:
         return path.exists()
     except OSError:
@@ -164,7 +164,7 @@ def _nowhere(wanted: str, exact: Path, is_name: bool) -> str:
 
 
 def _beside(path: Path) -> str:
-    """Which tree in the folder of a path that is not there may be meant."""
+    """Return the tree beside a missing path that may be meant."""
     try:
         there = sorted(path.parent.iterdir())
         files = {each.stem: each.name for each in there if is_tree_file(each)}
@@ -175,11 +175,11 @@ def _beside(path: Path) -> str:
 
 
 def _searched(exact: Path) -> str:
-    """Where a name was looked for."""
+    """Say where a name was looked for."""
     folders = [exact.parent.absolute(), *(each for each in tree_folders() if each.is_dir())]
     return f"looked in {listing(dict.fromkeys(map(str, folders)), _MOST)}"
 
 
 def is_tree_file(path: Path) -> bool:
-    """Whether a file is one of a tree, by its name."""
+    """Return whether a file is a tree's, by its name."""
     return path.suffix in _SUFFIXES and not path.name.startswith(".")

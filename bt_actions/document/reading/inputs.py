@@ -1,4 +1,4 @@
-"""Values given to a tree from outside, checked against what it declares."""
+"""Values given to a tree, checked against the inputs that the tree declares."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from bt_actions.utilities.suggest import did_you_mean, listing
 
 
 class InputError(ValueError):
-    """A value given to a tree does not fit what it declares; the fault is the giver's."""
+    """A value that does not fit the inputs of a tree; the fault is the giver's."""
 
     def __init__(self, message: str, missing: str = "") -> None:
-        """`missing` is the input without a value, where that is what is wrong."""
+        """Take the text; `missing` is the input without a value, where that is the error."""
         super().__init__(message)
         self.missing = missing
 
@@ -44,11 +44,11 @@ class TreeInput:
     unit: str = ""
     description: str = ""
     secret: bool = False
-    """Whether no event, log or file tells its value."""
+    """Whether events, logs and files keep the value to themselves."""
 
 
 def inputs_of(document: Document) -> dict[str, TreeInput]:
-    """What a tree wants to be given."""
+    """Return the inputs that a tree declares."""
     return {
         name: TreeInput(
             name,
@@ -66,7 +66,7 @@ def inputs_of(document: Document) -> dict[str, TreeInput]:
 def check_inputs(
     document: Document, given: Mapping[str, object], *, types: bool = True
 ) -> dict[str, object]:
-    """The value of every input: what was given, converted to its type, or its default.
+    """Return the value of every input: the given value, converted to its type, or the default.
 
     Raises InputError for an unknown input, a missing one, or a value that does not fit.
     """
@@ -90,7 +90,7 @@ def check_inputs(
 
 
 def convert(value: object, type_name: str, *, types: bool = True) -> object:
-    """A value as an input of a type has it. Raises ValueError with a readable text."""
+    """Convert a value to the type of an input. Raises ValueError with a readable text."""
     kind = parse_type(type_name, types=types)
     if kind is None:
         return value
@@ -100,10 +100,10 @@ def convert(value: object, type_name: str, *, types: bool = True) -> object:
 
 
 def parse_input(text: str, type_name: str) -> object:
-    """A value as it is written on the command line, for an input of a type.
+    """Read a value from the command line, for an input of a type.
 
-    A `string` is taken as it stands; ``@points.yaml`` is what the file holds; everything else is
-    read as YAML is (``[1, 2]``, ``{x: 1.0}``). Raises ValueError with a readable text.
+    A `string` is taken as it stands; ``@points.yaml`` stands for the content of that file; anything
+    else is YAML (``[1, 2]``, ``{x: 1.0}``). Raises ValueError with a readable text.
     """
     kind = parse_type(type_name)
     if isinstance(kind, Scalar) and kind.name == "string":
@@ -117,7 +117,7 @@ def parse_input(text: str, type_name: str) -> object:
 
 
 def parse_text(text: str) -> object:
-    """What a text says in YAML, as plain data. Raises ValueError with a readable text."""
+    """Read a text of YAML as plain data. Raises ValueError with a readable text."""
     source = Source("value", text)
     node = compose(source)
     if source.findings:
@@ -134,7 +134,7 @@ def parse_text(text: str) -> object:
 
 
 def refuse_infinite(value: object) -> None:
-    """Raise ValueError where a value is, or holds, a number that is not finite."""
+    """Raise ValueError for a value that is, or holds, a number that is not finite."""
     waiting = [value]
     while waiting:
         value = waiting.pop()

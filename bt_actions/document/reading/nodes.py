@@ -1,6 +1,6 @@
 """From YAML nodes to the nodes of a tree: their kinds, and the forms of their keys.
 
-Reports what is wrong as `read.py` does.
+Mistakes are reported as in `read.py`.
 """
 
 from __future__ import annotations
@@ -33,23 +33,23 @@ from bt_actions.utilities.suggest import closest, did_you_mean, folded, listing
 
 _CHILDREN = ("child", "children")
 _BESIDE_CHILD = frozenset({"timeout", "retry"})
-"""Kinds only beside `child:`; settings of an action elsewhere."""
+"""Words that are kinds only beside `child:`, and settings of an action elsewhere."""
 _BESIDE_TYPE = frozenset({"action", *_BESIDE_CHILD})
-"""Kinds that are taken for keys in a node whose kind stands behind 'type:'."""
+"""Words that are keys in a node whose kind stands behind 'type:'."""
 _LONGEST = 40
 _SIGNS = frozenset(":,{}[]#\n")
 _IN_SEQUENCE = "put a sequence there, and the list into it: {sequence: name, children: [...]}"
 
 
 def read_root(document: Document) -> None:
-    """Read the nodes of a document whose actions are all known (its imports' among them)."""
+    """Read the nodes of a document, once all its actions are known (its imports' among them)."""
     written = document.node.get("root")
     if written is not None:
         document.root = _Reader(document).tree(written)
 
 
 class _Reader:
-    """Reads nodes. No recursion: trees inside each other are read while others wait."""
+    """Reads nodes without recursion: children wait in a list while others are read."""
 
     def __init__(self, document: Document) -> None:
         self._source = document.source
@@ -63,14 +63,14 @@ class _Reader:
         actions = document.node.get("actions")
         own = actions.pairs if isinstance(actions, Mapping) else []
         self._refused = {key.text for key, _ in own} & NODE_KEYS
-        """Names of actions that were reported: what looks like a key may be meant for one."""
+        """Reported names of actions that look like keys: such a key may mean the action."""
         self._astray = {key.text for key, _ in document.node.pairs} & {*_CHILDREN}
-        """Keys of some node that stand at the top, which was reported."""
+        """Keys of some node that stand at the top, and are reported there."""
         self._waiting: list[tuple[TreeNode, Node]] = []
-        """Children to be read, each with its parent; the next is the last."""
+        """Children to be read, each with its parent; the last is read next."""
 
     def tree(self, written: Node) -> TreeNode | None:
-        """The tree that begins with a node."""
+        """Read the tree that begins with a node."""
         root = self._node(written)
         while self._waiting:
             parent, item = self._waiting.pop()
@@ -81,7 +81,7 @@ class _Reader:
         return root
 
     def _node(self, written: Node) -> TreeNode | None:
-        """A node by itself; its children wait."""
+        """Read a node by itself; its children wait."""
         source = self._source
         if not isinstance(written, Mapping):
             hint: str | None = None
@@ -114,7 +114,7 @@ class _Reader:
         return node
 
     def _typed(self, written: Mapping, said: Node) -> bool:
-        """Whether a node says its kind behind 'type:', which is reported."""
+        """Report a node whose kind stands behind 'type:', and return whether there is one."""
         if not isinstance(said, Scalar) or "/" in said.text:
             return False
         kinds = {folded(kind): kind for kind in self._kinds}
@@ -136,7 +136,7 @@ class _Reader:
         return True
 
     def _kind_key(self, written: Mapping) -> Scalar | None:
-        """The one key that is a kind or an alias, or None after reporting."""
+        """Return the one key that is a kind or an alias, or None after a report."""
         kinds, said = [], None
         for key, inner in written.pairs:
             if key.text in self._kinds:
@@ -181,7 +181,7 @@ class _Reader:
         return None
 
     def _nested(self, written: Mapping, first: Scalar, second: Scalar) -> str | None:
-        """What to write where one of two kinds is a decorator, which goes around the other."""
+        """Say what to write where one of two kinds is a decorator, to stand around the other."""
         for outer, inner in ((first, second), (second, first)):
             kind = KINDS.get(outer.text)
             if kind is not None and kind.group is Group.DECORATOR:
@@ -212,7 +212,7 @@ class _Reader:
         self._source.report("BT201", span_of(key), message, hint=None if near else hint)
 
     def _only_children(self, written: Mapping) -> None:
-        """What is below a node that could not be read is read for its own sake."""
+        """Read the nodes below a node that could not be read, for their own mistakes."""
         for name in _CHILDREN:
             inner = written.get(name)
             if inner is not None:
@@ -293,10 +293,10 @@ class _Reader:
         keys: MappingType[str, Key],
         beside: list[tuple[Scalar, Node]],
     ) -> str | None:
-        """What to write for a collection that stands below a kind's word, in the place of a name.
+        """Say what to write for a collection below a kind's word, in the place of a name.
 
-        It is read on as if it stood where it belongs: keys that belong beside the word are added to
-        `beside`. None, where nobody can tell what is meant.
+        The reading goes on as if the collection stood where it belongs: keys that belong beside the
+        word are added to `beside`. None where no meaning is likely.
         """
         kind = node.kind
         if isinstance(kind.value, Table):
@@ -328,7 +328,7 @@ class _Reader:
         return f"{write}, and the {what} beside it, under '{held}:'"
 
     def _holds_nodes(self, inner: Node | None) -> bool:
-        """Whether this is a list, or a node, rather than a setting."""
+        """Return whether `inner` is a list, or a node, rather than a setting."""
         return isinstance(inner, Listing) or (
             isinstance(inner, Mapping)
             and any(key.text in self._kinds or key.text in _CHILDREN for key, _ in inner.pairs)
@@ -373,7 +373,7 @@ class _Reader:
 
 
 def _decorator_of(word: str, keys: MappingType[str, Key]) -> str | None:
-    """The decorator that an unknown key is likely to be meant for."""
+    """Return the decorator that an unknown key is likely to mean."""
     names = [kind.name for kind in KINDS.values() if kind.group is Group.DECORATOR]
     meant = {key: name for name in names for key in KINDS[name].keys if key != "name"}
     meant |= {name: name for name in names}
@@ -383,9 +383,9 @@ def _decorator_of(word: str, keys: MappingType[str, Key]) -> str | None:
 
 
 def _around(written: Mapping, outer: Scalar, inner: Scalar, decorator: str = "") -> str:
-    """Put a decorator around a node: `outer` and `inner` are the two keys of what was written.
+    """Put a decorator around a node: `outer` and `inner` are the two keys of the text.
 
-    `decorator` is the kind that is meant, where `outer` is one of its keys, or looks like its name.
+    `decorator` is the likely kind, where `outer` is one of its keys, or looks like its name.
     """
     decorator = decorator or outer.text
     kind = KINDS[decorator]
@@ -412,7 +412,7 @@ def _a_kind(word: str) -> str:
 
 
 def _text(node: Node | None) -> str:
-    """A short scalar as it is, if it can stand in braces so; dots for anything else."""
+    """Return a short scalar as it is, where that can stand in braces; dots for anything else."""
     said = node.text if isinstance(node, Scalar) else ""
     return said if 0 < len(said) <= _LONGEST and _SIGNS.isdisjoint(said) else "..."
 

@@ -1,7 +1,7 @@
-"""From YAML nodes to a document, by the language: what may stand at the top.
+"""From YAML nodes to a document, by the language: the keys at the top.
 
-Reports everything that is wrong with the form and goes on; names and types are the checker's. A
-part that was reported stands as BAD, so that nothing is said about it twice.
+Every mistake of form is reported, and the reading goes on; names and types are the checker's. A
+reported part becomes BAD, so that no second finding is about it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from bt_actions.utilities.suggest import closest
 
 
 def read_document(source: Source, *, library: bool = False) -> Document | None:
-    """The document in a source, without its nodes (see `nodes.py`); None when there is none.
+    """Read the document in a source, without its nodes (`nodes.py` reads these); None without one.
 
     `library` is a file that another imports: it needs no tree, and may hold none.
     """
@@ -69,7 +69,7 @@ def read_document(source: Source, *, library: bool = False) -> Document | None:
 
 
 def _misplaced(node: Mapping, keys: MappingType[str, Key], source: Source) -> list[str]:
-    """Keys at the top that belong to a node, or to all actions, which are reported."""
+    """Report keys at the top that belong to a node, or to all actions; return their names."""
     found = []
     for key, _ in node.pairs:
         if key.text in keys or not _of_node(key.text) or any(key_here(key.text, keys)):

@@ -1,7 +1,7 @@
-"""A document after reading: what was said, with the YAML node each part came from.
+"""A document after reading: plain values, with the YAML node of each part.
 
-Plain values, and what comes of them for a node: settings, ROS names, writes. Nothing here checks or
-builds.
+What follows from the values for a node is here, too: settings, ROS names, writes. Nothing here
+checks or builds.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from bt_actions.document.yaml.source import Source
 class TreeNode:
     """A node of the tree.
 
-    `values` holds what was read under each key (the kind's own key included), `written` the YAML
-    node of each; `level` is how deep it is, from 1. `alias` is the action's name in this document,
-    where the node's key is one; its kind is `action` then. `included` is the tree that a subtree
-    stands for. `is_action` tells whether it sends a goal, also to a server of trees.
+    `values` holds the value of each key (the kind's own key included), `written` the YAML node of
+    each. `level` is the depth of the node, from 1. `alias` is the action's name in this document,
+    where the node's key is one; the kind is `action` then. `included` is the tree that a subtree
+    stands for. `is_action` tells whether the node sends a goal, also to a server of trees.
     """
 
     kind: Kind
@@ -47,19 +47,19 @@ class TreeNode:
 
     @property
     def place(self) -> Place:
-        """Where the node's kind is written, or the node begins whose kind is merged into it."""
+        """The place of the node's kind; of the node itself where the kind is merged into it."""
         node, at = self.node, self.key.begin
         if not node.begin.index <= at.index < node.end.index:
             at = node.begin
         return Place(self.source.name, at.line + 1, at.column + 1)
 
     def release(self) -> None:
-        """Keep of the YAML only where it stands: nothing more is made from it."""
+        """Drop the YAML nodes, but for their places: nothing more is made from them."""
         self.node.pairs.clear()
         self.written.clear()
 
     def walk(self) -> Iterator[TreeNode]:
-        """This node and all below it, in the order of the text."""
+        """Yield this node and all nodes below it, in the order of the text."""
         stack = [self]
         while stack:
             node = stack.pop()
@@ -69,7 +69,7 @@ class TreeNode:
 
 @dataclass(slots=True)
 class Declared:
-    """Something with a name: an input, an output, an action, a topic."""
+    """A declaration with a name: an input, an output, an action, a topic."""
 
     name: str
     values: dict[str, object]
@@ -83,12 +83,12 @@ class Declared:
 
     @property
     def parts(self) -> dict[str, Node]:
-        """The YAML node of each of its keys."""
+        """The YAML node of each key."""
         pairs = self.node.pairs if isinstance(self.node, Mapping) else ()
         return {key.text: inner for key, inner in pairs}
 
     def written(self, key: str) -> Node:
-        """The YAML node of one of its keys, or of the whole where it is written short."""
+        """Return the YAML node of a key, or of the whole declaration in its short form."""
         return self.parts.get(key, self.node)
 
 
@@ -105,17 +105,17 @@ class Document:
     actions: dict[str, Declared] = field(default_factory=dict)
     topics: dict[str, Declared] = field(default_factory=dict)
     kinds: dict[str, Declared] = field(default_factory=dict)
-    """The kinds of its own."""
+    """The kinds that the document declares."""
     defaults: dict[str, object] = field(default_factory=dict)
     settings: dict[str | None, dict[str, object]] = field(default_factory=dict)
-    """What each alias (None: no alias) has where a node says nothing; made when first asked for."""
+    """The settings of each alias (None: no alias) for nodes that say nothing; made on demand."""
     root: TreeNode | None = None
     imported: list[Document] = field(default_factory=list)
     size: int = 0
     height: int = 0
-    """How many nodes the tree has, and on how many levels, with all that it includes."""
+    """The number of nodes and of levels of the tree, with all that it includes."""
     gated: bool = False
-    """Whether a node of the tree, or of one that it includes, may be left out."""
+    """Whether `only_if` or `only_while` may leave out a node of the tree, or of an included one."""
     _nodes: tuple[TreeNode, ...] = ()
 
     @property
@@ -124,7 +124,7 @@ class Document:
         return value if isinstance(value, str) else ""
 
     def with_imports(self) -> Iterator[Document]:
-        """This document and all that it imports, each once."""
+        """Yield this document and all that it imports, each once."""
         waiting, seen = [self], set()
         while waiting:
             one = waiting.pop()
@@ -134,26 +134,26 @@ class Document:
                 waiting.extend(one.imported)
 
     def nodes(self) -> tuple[TreeNode, ...]:
-        """All nodes of the tree, which was read to its end, in the order of the text."""
+        """Return all nodes of the tree in the order of the text, once the whole tree is read."""
         if not self._nodes and self.root is not None:
             self._nodes = tuple(self.root.walk())
         return self._nodes
 
 
 def text_of(values: MappingType[str, object], key: str) -> str:
-    """A text as it is, and anything else as an empty one."""
+    """Return the text under a key; "" for anything else."""
     value = values.get(key)
     return value if isinstance(value, str) else ""
 
 
 def table_of(value: object) -> dict[str, Any]:
-    """A mapping as it is, and anything else as an empty one."""
+    """Return a mapping as it is, and {} for anything else."""
     return value if isinstance(value, dict) else {}
 
 
 @lru_cache(maxsize=1024)
 def join_names(*parts: str) -> str:
-    """ROS names put together; an absolute one, and one of the node's own (~), begins anew."""
+    """Join ROS names; an absolute name, and a name of the node's own (~), begins anew."""
     joined = ""
     for part in parts:
         trimmed = part if part == "/" else part.rstrip("/")
@@ -165,7 +165,7 @@ def join_names(*parts: str) -> str:
 
 
 def merged(base: dict[str, object], over: dict[str, object]) -> dict[str, object]:
-    """Two mappings of settings as one, key by key to any depth; `over` wins."""
+    """Merge two mappings of settings, key by key to any depth; `over` wins."""
     result = {**base, **over}
     for name, earlier in base.items():
         if isinstance(earlier, dict) and isinstance(value := over.get(name), dict):
@@ -174,12 +174,12 @@ def merged(base: dict[str, object], over: dict[str, object]) -> dict[str, object
 
 
 def settings_of(node: TreeNode, document: Document) -> dict[str, object]:
-    """A node's settings over its alias's over the document's defaults, key by key."""
+    """Return a node's settings over its alias's over the document's defaults, key by key."""
     return merged(shared_settings(node.alias, document), node.values)
 
 
 def shared_settings(alias: str | None, document: Document) -> dict[str, object]:
-    """What the nodes of an alias (None: of no alias) have where they say nothing."""
+    """Return the settings of an alias (None: of no alias) for nodes that say nothing."""
     shared = document.settings.get(alias)
     if shared is None:
         declared = document.actions.get(alias) if alias is not None else None
@@ -189,12 +189,12 @@ def shared_settings(alias: str | None, document: Document) -> dict[str, object]:
 
 
 def server_of(settings: MappingType[str, object]) -> str:
-    """The name of an action's server; that of a server of trees where none is given."""
+    """Return the name of an action's server; of the server of trees where no name is given."""
     return text_of(settings, "server") or "run_tree"
 
 
 def when_of(settings: object) -> object:
-    """The condition of settings for another attempt."""
+    """Return the condition of settings for another attempt."""
     retry = settings.get("retry") if isinstance(settings, dict) else None
     return retry.get("when") if isinstance(retry, dict) else None
 
@@ -207,9 +207,9 @@ _Known = dict[tuple[int, str], dict[str, TreeNode]]
 def resources_below(
     root: TreeNode, document: Document, namespace: str = "", known: _Known | None = None
 ) -> dict[str, TreeNode]:
-    """What the actions of a subtree hold while they run, with the first node that does.
+    """Return the resources that a subtree's actions hold, each with the first node that holds it.
 
-    `known` keeps what trees that are included hold, for later calls.
+    `known` keeps the resources of included trees, for later calls.
     """
     known = {} if known is None else known
     found: dict[str, TreeNode] = {}
@@ -241,18 +241,18 @@ class Write:
     name: str
     node: TreeNode
     under: str
-    """The key of the node that says so; none where the action's declaration does."""
+    """The node's key that says so; "" where the action's declaration says so."""
     value: object
     root: str | None = None
 
     @property
     def depends(self) -> bool:
-        """Does the type of what is written depend on those of variables?"""
+        """Whether the type of the written value depends on the types of variables."""
         return isinstance(self.value, Computed) and bool(self.value.expression.variables)
 
 
 def writes_of(node: TreeNode, document: Document) -> list[Write]:
-    """The variables that a node itself writes."""
+    """Return the variables that a node itself writes."""
     values = node.values
     kind, interface = node.kind, node.kind.interface
     if kind.writes is not None:
@@ -273,7 +273,7 @@ def writes_of(node: TreeNode, document: Document) -> list[Write]:
 
 
 def always_there(document: Document) -> set[str]:
-    """The variables that have a value from the beginning, though no one gives it: zero."""
+    """Return the variables with a value from the beginning that nobody gives: zero."""
     tables = (
         settings_of(node, document).get(SAVES[1]) for node in document.nodes() if node.is_action
     )

@@ -1,7 +1,17 @@
-"""What the errors of a document leave open: parts that could not be read, and names in them.
+"""Doubts: what the errors of a document leave open. One mistake is to be told once.
 
-One mistake is told once. A name that may be declared in such a part is not called unknown, one that
-may be used there is not called unused, and no hazard is told of a node that holds such a part.
+A part of the text that has an error is not read on, so the checker does not see what stands in it.
+The checker would then complain of things that are right: a variable would be unknown because its
+declaration is unread, or an action unused because its only user is. Each source keeps its unread
+parts (`Source.unread`): their YAML nodes, and flags for names that may be anything. From these
+`Doubts` answers, before such a finding is told:
+
+- A name is not called unknown where an unread part may declare the name (`declares`).
+- A name is not called unused where an unread part may use the name (`mentions`). Any word in an
+  unread text counts as a use.
+- No hazard is told of a node that holds an unread part (`own`, `below`), whose settings are unread
+  (`alias`), or that includes a tree with errors. Whether a part lies inside of a node is decided by
+  the places of both in the text; an anchor in the text makes that uncertain, and the answer is yes.
 """
 
 from __future__ import annotations
@@ -17,13 +27,13 @@ from bt_actions.document.yaml.written import scalars_of
 
 _WORD = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _NAME = re.compile(r"[A-Za-z0-9_ -]+")
-"""What somebody may have written as a name, and no expression."""
+"""A text that may be a name, and no expression."""
 _KNOWN = ("root", "inputs", "outputs", "actions", "topics", "kinds")
-"""Keys at the top of a tree whose values say nothing about the settings of all actions."""
+"""Keys at the top of a tree whose values hold no settings of all actions."""
 
 
 class Doubts:
-    """What is not certain about one document; made anew after more of it was read."""
+    """The doubts about one document; made anew after more of the document was read."""
 
     def __init__(self, document: Document) -> None:
         self._document = document
@@ -33,7 +43,7 @@ class Doubts:
 
     @property
     def any(self) -> bool:
-        """Whether there is anything that is not certain."""
+        """Whether the document has any doubt."""
         return any(
             part.nodes or part.names or part.variables or part.actions for part in self._parts
         ) or any(
@@ -42,40 +52,40 @@ class Doubts:
         )
 
     def declares(self, name: str) -> bool:
-        """Whether a name may be declared in what could not be read."""
+        """Return whether an unread part may declare a name."""
         return any(part.names for part in self._parts) or name in self.declared
 
     @cached_property
     def declared(self) -> set[str]:
-        """The words of what could not be read that may be names."""
+        """The words of unread parts that may be names."""
         names = (text for text in self._texts if _NAME.fullmatch(text))
         return {word for text in names for word in (text, *_WORD.findall(text))}
 
     def mentions(self, name: str) -> bool:
-        """Whether a name may stand in what could not be read, or be what an unknown one means."""
+        """Return whether an unread part may use a name, or an unknown name may mean it."""
         return (
             any(part.names or name in part.meant for part in self._parts) or name in self._mentioned
         )
 
     @property
     def unknown_variable(self) -> bool:
-        """Whether a variable is read that nobody knows: any may be meant."""
+        """Whether an unknown variable is read, which may mean any variable."""
         return any(part.variables for part in self._parts)
 
     @property
     def unknown_action(self) -> bool:
-        """Whether there is a node of a kind that nobody knows: any action may be meant."""
+        """Whether a node has an unknown kind, which may mean any action."""
         return any(part.actions for part in self._parts)
 
     def own(self, node: TreeNode) -> bool:
-        """Whether something of a node itself, not of its children, could not be read."""
+        """Return whether a node itself, without its children, has an unread part."""
         if not node.source.unread.nodes:
             return False
         inner = sum(self._count(child.node, node.source) for child in node.children)
         return node.source.anchored or self._count(node.node, node.source) > inner
 
     def below(self, root: TreeNode) -> bool:
-        """Whether something of a node or what is below it, or of what they use, is open."""
+        """Return whether a node, a node below, or an action that these use has an unread part."""
         parts = [part for part in self._parts if part.nodes or part.names]
         if parts and (self._settings() or self._within(root.node, root.source)):
             return True
@@ -87,14 +97,14 @@ class Doubts:
         return False
 
     def alias(self, name: str) -> bool:
-        """Whether something of an action's declaration, or of all actions' settings, is open."""
+        """Return whether an action's declaration, or settings of all actions, may be unread."""
         declared = self._document.actions.get(name)
         return self._settings() or (
             declared is not None and self._within(declared.node, declared.source)
         )
 
     def _settings(self) -> bool:
-        """Whether settings that hold for all actions may be in what could not be read."""
+        """Return whether an unread part may hold settings of all actions."""
         if any(part.names for part in self._parts):
             return True
         for document in self._document.with_imports():
@@ -109,7 +119,7 @@ class Doubts:
         return bool(source.unread.nodes) and (source.anchored or self._count(node, source) > 0)
 
     def _count(self, node: Node, source: Source) -> int:
-        """How many unread parts begin inside a node."""
+        """Count the unread parts that begin inside a node."""
         places = self._places.get(id(source))
         if places is None:
             places = sorted((one.line, one.column) for one in source.unread.nodes)
@@ -123,6 +133,6 @@ class Doubts:
 
     @cached_property
     def _texts(self) -> set[str]:
-        """All that stands in what could not be read."""
+        """All scalars in unread parts."""
         unread = [node for part in self._parts for node in part.nodes]
         return {scalar.text for node in unread for scalar in scalars_of(node)}

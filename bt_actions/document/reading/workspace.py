@@ -1,7 +1,7 @@
-"""Opens a tree with all that it imports and includes; each file is read once.
+"""A tree with all that it imports and includes; each file is read once.
 
-What cannot be opened is reported where it is named. Nothing is checked here but that the trees
-do not include themselves and do not unfold without bound.
+A file that cannot be opened is reported at its name in the tree. The only checks here are for
+trees that include themselves, and for trees that unfold without bound.
 """
 
 from __future__ import annotations
@@ -21,22 +21,23 @@ from bt_actions.document.yaml.nodes import Listing, Node, span_of
 from bt_actions.document.yaml.source import SUFFIXES, Source, absolute, read_source
 
 MAX_TREE_NODES = 1_000_000
-"""Nodes of a tree after all that it includes was unfolded."""
+"""Nodes of a tree, with all included trees unfolded."""
 MAX_LEVELS = 200
-"""Nodes inside each other after all that a tree includes was unfolded: py_trees ticks and stops a
-tree by recursion, and Python has 1,000 levels of that for everything."""
+"""Levels of a tree, with all included trees unfolded: py_trees ticks and stops a tree by recursion,
+and Python has 1,000 levels of recursion for everything.
+"""
 _HIDDEN = "•••"
-"""In place of a secret, as in events."""
+"""The stand-in for a secret, as in events."""
 _MAX_CHAIN = 50
 _MAX_FILES = 2 * _MAX_CHAIN
-"""Trees inside each other, and then files that import each other."""
+"""Levels of trees inside each other, and of files that import each other."""
 
 
 class Workspace:
-    """The documents that belong to one or several trees."""
+    """The documents of one or several trees."""
 
     def __init__(self, within: Iterable[Path] | None = None) -> None:
-        """`within` are the folders in which every file must lie; None: anywhere."""
+        """Open files in the folders `within` alone; None: anywhere."""
         self._within: tuple[Path, ...] | None = None
         if within is not None:
             ways = [(absolute(each), each.resolve()) for each in within]
@@ -47,9 +48,9 @@ class Workspace:
         self._keys: dict[Path, Path] = {}
 
     def open(self, path: Path, name: str | None = None) -> Document | None:
-        """The tree in a file, with its imports and subtrees; None when there is none to speak of.
+        """Open the tree in a file, with its imports and subtrees; None without a tree.
 
-        Raises DocumentError when the file cannot be read at all.
+        Raises DocumentError where the file cannot be read at all.
         """
         source = read_source(path, name, pipes=self._within is None)
         source.within = self._within
@@ -59,19 +60,19 @@ class Workspace:
         return self._open(source, (path,))
 
     def open_source(self, source: Source) -> Document | None:
-        """The tree in a source that was read already (standard input, an editor's buffer)."""
+        """Open the tree in a source that was read already (standard input, an editor's buffer)."""
         return self._open(source, () if source.path is None else (source.path,))
 
     @property
     def documents(self) -> list[Document]:
-        """Every document that was opened, in the order of opening."""
+        """Every open document, in the order of opening."""
         return [document for document in self._documents.values() if document is not None]
 
     @property
     def files(self) -> dict[Path, str]:
-        """Every file that was read, as it was named, with its text; that of data files is empty.
+        """Every file that was read, by the name in its tree, with its text; "" for a data file.
 
-        Nobody is told the defaults of secret inputs: what else stands there keeps its line.
+        Defaults of secret inputs are blanked; the lines around them keep their numbers.
         """
         found = {each.path: each.text for each in self._sources if each.path}
         for document in self.documents:
@@ -85,7 +86,7 @@ class Workspace:
 
     @property
     def findings(self) -> list[Finding]:
-        """Everything found in any of them, by file and place."""
+        """All findings of all sources, by file and place."""
         failed = [error.findings for error in self._failed.values()]
         found = [one for findings in failed for one in findings if one.code == "BT101"]
         for source in self._sources:
@@ -94,7 +95,7 @@ class Workspace:
 
     @contextlib.contextmanager
     def as_it_was(self) -> Iterator[None]:
-        """Forget in the end what is found meanwhile."""
+        """Forget at the end all findings of the time between."""
         before = [(source, len(source.findings), source.errors) for source in self._sources]
         try:
             yield
@@ -165,7 +166,7 @@ class Workspace:
         *,
         library: bool = False,
     ) -> Document | None:
-        """A tree to include, or a `library` to import, by the name that a source gives it."""
+        """Open a tree to include, or a `library` to import, by the name in a source."""
         path = self._find(wanted, written, source)
         if path is None:
             return None
@@ -253,7 +254,7 @@ class Workspace:
         )  # fmt: skip
 
     def _key(self, path: Path) -> Path:
-        """The file itself, wherever links lead; looked for once it matters."""
+        """Return the file itself, behind all links; found on demand."""
         if path not in self._keys:
             try:
                 self._keys[path] = path.resolve()
@@ -263,7 +264,7 @@ class Workspace:
 
 
 def _shown(path: Path, source: Source) -> str:
-    """The file's name as a person would write it: as short as the including file's."""
+    """Return a file's name as a person would write it: as short as the including file's."""
     if source.path is not None and not Path(source.name).is_absolute():
         try:
             return str(path.resolve().relative_to(Path.cwd()))
@@ -273,6 +274,6 @@ def _shown(path: Path, source: Source) -> str:
 
 
 def _blanked(text: str, begin: int, end: int) -> str:
-    """The text without what stands between two of its characters, but for the ends of lines."""
+    """Return the text with the characters between two places blanked, but for the ends of lines."""
     lines = text[begin:end].count("\n")
     return f"{text[:begin]}{_HIDDEN}{chr(10) * lines}{text[end:]}"

@@ -1,4 +1,4 @@
 """The text of a document and its YAML nodes, each with its place. Knows no tree.
 
-What is read within bounds here (bytes, depth, nodes) needs no bound above.
+Bounds of bytes, depth and nodes are kept here, so rooms above need none.
 """

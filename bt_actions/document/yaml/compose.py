@@ -1,9 +1,8 @@
-"""From YAML text to nodes. Says nothing about behaviour trees.
+"""From YAML text to nodes. Knows nothing of behaviour trees.
 
-libyaml's events are put together here rather than by PyYAML's own composer: nesting, aliases and
+A composer of our own puts libyaml's events together, in place of PyYAML's: nesting, aliases and
 memory stay bounded, both ends of every node are kept, and duplicate keys are seen. PyYAML's parser
-in Python is not used in its place: it is ten times as slow, and says other things about the same
-mistakes.
+in Python does not serve instead: it is ten times as slow, and words the same mistakes differently.
 
 libyaml ends a line at U+0085, U+2028 and U+2029, as YAML 1.1 had it, and refuses a character that
 JSON writes as two halves of UTF-16 (``"\\ud83d\\ude00"``). A stand-in takes the place of each such
@@ -31,7 +30,8 @@ MAX_DEPTH = 200
 """Levels of YAML nesting, aliases unfolded; a level of the tree takes two."""
 MAX_NODES = 2_000_000
 """Nodes of a text, its aliases unfolded; a list or a mapping counts twice, as it begins and ends.
-A tree of 100,000 nodes has about half of it."""
+A tree of 100,000 nodes has about half of this.
+"""
 _TOO_DEEP = f"nested deeper than {MAX_DEPTH} levels"
 _TOO_LARGE = f"this is, or unfolds to, more than {MAX_NODES:,} nodes"
 _SEPARATORS = {"\x85": "\ufdd0", "\u2028": "\ufdd1", "\u2029": "\ufdd2"}
@@ -47,19 +47,19 @@ NO_LIBYAML = (
 
 
 def compose(source: Source) -> Node | None:
-    """The document in a source, or None when it has none or cannot be read.
+    """Return the document in a source, or None where there is none, or none that can be read.
 
-    What is wrong is reported to the source; after a syntax error, or too many of others, nothing
-    can be read on. Raises ImportError, with the name libyaml, where that is missing.
+    Mistakes are reported to the source; a syntax error, or too many other errors, ends the
+    reading. Raises ImportError, with the name libyaml, where that is missing.
     """
     source.root = _composed(_Composer(source), source)
     return source.root
 
 
 def compose_written(source: Source) -> tuple[Node | None, dict[int, str]]:
-    """As `compose`, but nothing is unfolded or merged: aliases stand as `Alias`.
+    """Return the document with aliases left as `Alias` and nothing merged, and the anchors.
 
-    Also gives the anchors, by the `id` of what they name.
+    An anchor stands under the `id` of the node that it names.
     """
     composer = _Composer(source, unfold=False)
     return _composed(composer, source), composer.anchored
@@ -76,11 +76,11 @@ def _composed(composer: _Composer, source: Source) -> Node | None:
 
 
 class _GaveUp(Exception):
-    """What was reported lets nothing be read on."""
+    """An end of the reading, after a report."""
 
 
 class _Composer:
-    """Puts events together, by recursion: no deeper than `MAX_DEPTH`."""
+    """Puts events together by recursion, no deeper than `MAX_DEPTH`."""
 
     def __init__(self, source: Source, *, unfold: bool = True) -> None:
         if not yaml.__with_libyaml__:
@@ -95,15 +95,15 @@ class _Composer:
         self._unfold = unfold
         self.anchored: dict[int, str] = {}
         self._anchors: dict[str, Node | None] = {}
-        """What names stand for; None while it is open."""
+        """The node of each anchor; None while that node is open."""
         self._measured: dict[int, tuple[int, int]] = {}
         self._unfolded = 0
-        """The size of all that aliases stand for."""
+        """The size of all nodes that aliases stand for."""
         self._level = 0
-        """How many collections are open."""
+        """The number of open collections."""
 
     def read(self) -> Node | None:
-        """The document, after all events were taken. Raises _GaveUp."""
+        """Take all events, and return the document. Raises _GaveUp."""
         root = None
         for event in self._events:
             if type(event) is yaml.StreamEndEvent:
@@ -125,7 +125,7 @@ class _Composer:
         raise _GaveUp
 
     def _beyond(self, get_event: Callable[[], Any]) -> Iterator[Any]:
-        """What comes after `MAX_NODES` events."""
+        """Give up: more events follow the first `MAX_NODES`."""
         self._give_up("BT105", get_event(), _TOO_LARGE)
         yield
 
@@ -186,7 +186,7 @@ class _Composer:
         return node
 
     def _refuse(self, key: Node, keys: dict[str, Scalar]) -> None:
-        """Report a key that is none, or is there already."""
+        """Report a key that is no key, or that is there already."""
         if not isinstance(key, Scalar):
             hint = _braced(key) or "a text that begins with { or [ needs quotes"
             message = "a key is a single word, not a list or a mapping"
@@ -246,7 +246,7 @@ class _Composer:
         return node
 
     def _measure(self, node: Node) -> tuple[int, int]:
-        """How large a node is with all that it holds, and how many levels it is high."""
+        """Return the size of a node with all that it holds, and its height in levels."""
         if isinstance(node, Mapping):
             inner = [part for pair in node.pairs for part in pair]
         elif isinstance(node, Listing):
@@ -287,7 +287,7 @@ _TAKES: dict[type, Callable[[_Composer, Any], Node]] = {
 
 
 def _braced(node: Node) -> str | None:
-    """What to write for `{{ x }}`, where the inner braces stand as a key."""
+    """Return what to write for `{{ x }}`, where the inner braces stand as a key."""
     if not isinstance(node, Mapping) or len(node.pairs) != 1 or not node.flow:
         return None
     key, value = node.pairs[0]

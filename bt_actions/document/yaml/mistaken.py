@@ -1,8 +1,8 @@
-"""What is read in another way than it is likely to be meant.
+"""Texts that YAML reads in another way than their author is likely to mean.
 
-``Part #3`` is the text ``Part`` and a comment; where a space follows the '#' a comment was meant,
-nobody can tell more. In ``“map”`` the quotes are a part of the text. ``{x}`` is a mapping of x to
-nothing, where a variable or a word was meant. ``5000`` are seconds.
+``Part #3`` is the text ``Part`` and a comment; where a space follows the '#', an author may well
+mean a comment, so nothing is said. In ``“map”`` the quotes are a part of the text. ``{x}`` is a
+mapping of x to nothing, where an author means a variable or a word. ``5000`` are seconds.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from bt_actions.utilities.units import TURN, spoken_duration
 _LONGEST = 40
 """Characters of a number in a message."""
 _LONG = 500.0
-"""Seconds that somebody would rather give in minutes."""
+"""Seconds that an author would rather give in minutes."""
 
 
 def warn_cut(node: Scalar, source: Source, what: str) -> None:
-    """Say so where a comment begins without a space behind its '#'; `what` was cut."""
+    """Warn of a comment that begins without a space behind its '#'; `what` was cut."""
     rest = _behind(node, source) if source.commented else ""
     if not rest:
         return
@@ -35,7 +35,7 @@ def warn_cut(node: Scalar, source: Source, what: str) -> None:
 
 
 def warn_quotes(node: Scalar, source: Source) -> None:
-    """Say so where a text is written in typographic quotes."""
+    """Warn of a text in typographic quotes."""
     inside = unquoted(node.text) if node.plain else None
     if inside is not None:
         source.report(
@@ -45,21 +45,21 @@ def warn_quotes(node: Scalar, source: Source) -> None:
 
 
 def cut_hint(node: Scalar, source: Source) -> str | None:
-    """What to add to an error in a text that a comment follows."""
+    """Return what to add to an error in a text that a comment follows."""
     if _behind(node, source).lstrip().startswith("#"):
         return "the '#' after it begins a comment: put the text in quotes"
     return None
 
 
 def _behind(node: Scalar, source: Source) -> str:
-    """What stands behind a plain text on its line, if a '#' is on that."""
+    """Return the rest of the line behind a plain text, where that rest holds a '#'."""
     if not node.plain or node.end_line not in source.commented:
         return ""
     return (source.line(node.end_line) or "")[node.end_column - 1 :]
 
 
 def report_braces(node: Node, source: Source) -> bool:
-    """Report `{x}` where no mapping is meant."""
+    """Report `{x}` where no mapping can stand, and return whether it stands there."""
     if not isinstance(node, Mapping) or not node.flow or len(node.pairs) != 1:
         return False
     key, value = node.pairs[0]
@@ -71,7 +71,7 @@ def report_braces(node: Node, source: Source) -> bool:
 
 
 def warn_bare_duration(node: Scalar, seconds: float, source: Source) -> None:
-    """Warn of so many seconds that milliseconds are likely to be meant."""
+    """Warn of a duration without a unit, so long that milliseconds are likely to be meant."""
     if abs(seconds) >= _LONG:
         said = "is {} s = " + spoken_duration(seconds)
         _warn_bare(node, source, "BT317", said, "for milliseconds write {0} ms, else {0} s")

@@ -1,6 +1,6 @@
-"""The nodes of a YAML text, which know their range. Says nothing about behaviour trees.
+"""The nodes of a YAML text, which know their range. Knows nothing of behaviour trees.
 
-Scalars are read as YAML 1.2 has them (`on` and `yes` are texts). Nodes are made in `compose.py`.
+Scalars are read as YAML 1.2 has them (`on` and `yes` are texts). `compose.py` makes the nodes.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Node:
 
 
 class Scalar(Node):
-    """A text; `plain` when it was written without quotes or a block's sign."""
+    """A text; `plain` where the text is written without quotes or a block's sign."""
 
     __slots__ = ("plain", "text")
     text: str
@@ -57,7 +57,7 @@ class Scalar(Node):
 
     @property
     def value(self) -> object:
-        """None, a bool, an int, a float or a text, by the core schema of YAML 1.2."""
+        """The value by the core schema of YAML 1.2: None, a bool, an int, a float or a text."""
         text = self.text
         if not self.plain:
             return text
@@ -75,14 +75,14 @@ class Listing(Node):
 
 
 class Mapping(Node):
-    """Pairs in the order they were written; each key is there once."""
+    """Pairs in the order of the text; no key is there twice."""
 
     __slots__ = ("flow", "pairs")
     pairs: list[tuple[Scalar, Node]]
     flow: bool
 
     def get(self, key: str) -> Node | None:
-        """The value of a key, or None."""
+        """Return the value of a key, or None."""
         for name, value in self.pairs:
             if name.text == key:
                 return value
@@ -90,14 +90,14 @@ class Mapping(Node):
 
 
 class Alias(Node):
-    """``*name``, where `compose_written` leaves it standing."""
+    """``*name``, where `compose_written` leaves the alias standing."""
 
     __slots__ = ("name",)
     name: str
 
 
 def walk(root: Node) -> Iterator[Node]:
-    """A node and all that is in it, keys too; what an alias repeats comes once."""
+    """Yield a node and all nodes in it, keys too; a node that an alias repeats comes once."""
     stack, seen = [root], set[int]()
     while stack:
         node = stack.pop()
@@ -114,26 +114,26 @@ def walk(root: Node) -> Iterator[Node]:
 
 
 def span_of(node: Node) -> Span:
-    """The range of a node."""
+    """Return the range of a node."""
     return Span(node.line, node.column, node.end_line, node.end_column)
 
 
 def start_of(node: Node) -> Span:
-    """The first character of a node."""
+    """Return the range of a node's first character."""
     return Span(node.line, node.column, node.line, node.column + 1)
 
 
 def beyond_floats(node: Scalar) -> bool:
-    """Whether a scalar is a number that no float64 can be, and not infinity itself."""
+    """Return whether a scalar is a finite number beyond the range of float64."""
     value = node.value
     return isinstance(value, float) and math.isinf(value) and "inf" not in node.text.lower()
 
 
 def data_of(node: Node) -> object:
-    """What a node says, as plain data: a dollar sign means nothing in it.
+    """Return a node as plain data: a dollar sign has no meaning in the data.
 
-    What stands there twice by an alias is one object. Raises ValueError for a number that no
-    float64 can be.
+    A node that an alias repeats becomes one object. Raises ValueError for a number beyond the range
+    of float64.
     """
     return _data_of(node, {})
 

@@ -1,6 +1,6 @@
 """The text of a document, read within bounds. No YAML here.
 
-Reading never takes more than `MAX_BYTES` of memory, whatever the path leads to.
+The reading of a file takes at most `MAX_BYTES` of memory, whatever the path leads to.
 """
 
 from __future__ import annotations
@@ -22,76 +22,76 @@ if TYPE_CHECKING:
     from bt_actions.document.yaml.nodes import Node
 
 MAX_BYTES = 32 * 1024 * 1024
-"""The largest file that is read; a tree of 100,000 nodes has about a third of it."""
+"""The largest file that is read; a tree of 100,000 nodes has about a third of this."""
 MAX_ERRORS = 1000
-"""After so many errors in a file the checker stops: each costs time to explain."""
+"""Errors in a file after which the checker stops: each costs time to explain."""
 SUFFIXES = (".yaml", ".yml", ".json")
-"""How the files end that a tree may name."""
+"""The endings of files that a tree may name."""
 _CHUNK = 65_536
 PIPE_PATIENCE = 5.0
-"""Seconds in which somebody must begin to write to a named pipe that is to be read."""
+"""Seconds in which a writer must begin to write to a named pipe."""
 Char = tuple[str, int, int]
 """A character of a text, and the line and column where it is written, from 1."""
 _FORBIDDEN = re.compile(
     "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufdcf\ufdf0-\ufffd\U00010000-\U0010ffff]"
 )
 _PLAIN = bytes([9, 10, 13, *range(32, 127)])
-"""What most texts are made of alone: then none is forbidden, and that is seen faster."""
+"""The only bytes of most texts: none of these is forbidden, which is seen faster than by search."""
 _UNSEEN = re.compile("[\x85\xa0\u1680\u2000-\u200d\u2028\u2029\u202f\u205f\u2060\u3000\ufeff]")
-"""Looks like a space, or like nothing."""
+"""Characters that look like a space, or like nothing."""
 _QUOTES = "“”„«»‘’‚"
 _QUOTED = re.compile(f"[{_QUOTES}]([^{_QUOTES}\"']+)[{_QUOTES}\"']")
 _DASHED = re.compile("[‐‑–—−][0-9.]")
-"""A number behind what looks like a minus sign."""
+"""A number behind a character that looks like a minus sign."""
 
 
 class TooManyErrors(Exception):
-    """A document has more errors than anybody wants to read: they are in its source.
+    """A document with more errors than anybody wants to read: its source holds them.
 
-    Whoever catches it must refuse the document: what follows in it was not looked at.
+    A caller must refuse the document, as the rest of the text was not read.
     """
 
 
 @dataclass(slots=True)
 class Unread:
-    """What was reported and is read no further; `unread.py` says what follows from it."""
+    """Reported parts of a document, which are read no further; `unread.py` says what follows."""
 
     nodes: list[Node] = field(default_factory=list)
     meant: set[str] = field(default_factory=set)
-    """Names that unknown ones probably stand for."""
+    """Names that unknown names probably stand for."""
     names: bool = False
-    """Whether any name may have been declared: in a file that is not there, as a loop's item."""
+    """Whether any name may be declared unseen: in a missing file, as a loop's item."""
     variables: bool = False
-    """Whether a variable is unknown, and nothing says which is meant."""
+    """Whether a variable is unknown, without a hint which is meant."""
     actions: bool = False
     """Whether a node's kind is unknown."""
 
 
 @dataclass(slots=True, eq=False)
 class Source:
-    """A document's text, the name it is known by, and the findings in it so far."""
+    """The text of a document, the name of the document, and the findings in it so far."""
 
     name: str
     text: str
     path: Path | None = None
     findings: list[Finding] = field(default_factory=list)
     anchored: bool = False
-    """Whether the text names parts of itself (&name); known after it was composed."""
+    """Whether the text names parts of itself (&name); known once it is composed."""
     root: Node | None = None
-    """The text as YAML nodes, after it was composed."""
+    """The text as YAML nodes, once it is composed."""
     unread: Unread = field(default_factory=Unread)
     settled: set[Span] = field(default_factory=set)
-    """Scalars about which enough was said."""
+    """Scalars that need no further finding."""
     decoded: tuple[Node, list[Char]] | None = None
-    """The scalar that written.py was last asked about, and where its characters are written."""
+    """The last scalar that written.py decoded, and the places of its characters."""
     within: tuple[Path, ...] | None = None
-    """The folders in which every file must lie that it names; None: anywhere."""
+    """The folders that hold every file this document may name; None: anywhere."""
     files: dict[Path, object] = field(default_factory=dict)
-    """What was read for it from other files as data, or the ValueError that came of it."""
+    """The data of other files that the document names, or the ValueError of the reading."""
     items: int = 0
-    """Of such data, each counted as often as the document names it."""
+    """Items of such data, each counted as often as the document names it."""
     errors: int = 0
-    """How many of the findings keep the tree from running."""
+    """The number of findings that keep the tree from running."""
     commented: frozenset[int] = field(init=False)
     """The numbers of the lines that hold a '#'."""
     _lines: list[str] | None = None
@@ -109,16 +109,16 @@ class Source:
         return self._lines
 
     def line(self, number: int) -> str | None:
-        """Line `number` (from 1), or None past the end."""
+        """Return line `number` (from 1), or None past the end."""
         lines = self.lines
         return lines[number - 1] if 0 < number <= len(lines) else None
 
     def refusal(self, path: Path) -> str:
-        """Why it may not name this file; or "".
+        """Return why the document may not name this file; or "".
 
-        By its name, or by where links lead, a file must lie in one of the folders: whoever may
-        write there has made the links in them. A link counts only where it is named as it lies
-        there: `link/../x` is beside what the link leads to.
+        By its name, or by where links lead, a file must lie in one of the folders: the owner of a
+        folder made the links in it. A link counts only by its place in the name: `link/../x` is
+        beside the target of the link.
         """
         if self.within is None:
             return ""
@@ -141,7 +141,7 @@ class Source:
         hint: str | None = None,
         related: Related | None = None,
     ) -> None:
-        """File a finding; its severity is its rule's. Raises TooManyErrors with `MAX_ERRORS`."""
+        """File a finding with the severity of its rule. Raises TooManyErrors with `MAX_ERRORS`."""
         if span in self.settled:
             return
         is_error = RULES[code].severity is Severity.ERROR
@@ -166,11 +166,10 @@ class Source:
             raise TooManyErrors
 
     def _look_alike(self, code: str, span: Span, message: str) -> str | None:
-        """Name what only looks like a space, a quote or a minus sign, and may be why an error is
-        found here.
+        """Name a character that looks like a space, a quote or a minus sign, and may be the cause.
 
-        A space is looked for in the indentation and the place itself; what is no YAML may go wrong
-        anywhere on the line, or the one above.
+        A space is looked for in the indentation and at the place itself. A syntax error may come
+        from anywhere on the line, or from the line above.
         """
         line = self.line(span.line) or ""
         end = span.end_column - 1 if span.end_line == span.line else len(line)
@@ -188,15 +187,15 @@ class Source:
 
     @property
     def has_errors(self) -> bool:
-        """Whether anything found so far keeps the tree from running."""
+        """Whether a finding so far keeps the tree from running."""
         return self.errors > 0
 
 
 def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> Source:
-    """The source in a file. Raises DocumentError when it cannot be read as text.
+    """Read the source in a file. Raises DocumentError where the file cannot be read as text.
 
-    Whoever writes to a pipe may keep its reader waiting: with `pipes=False` none is read, as where
-    the path stands in a tree and was not given by the user.
+    The writer of a pipe may keep its reader waiting: `pipes=False` refuses a pipe, for paths that
+    stand in a tree and are not the user's.
     """
     name = name or str(path)
     try:
@@ -226,7 +225,7 @@ def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> S
 
 
 def absolute(path: Path) -> Path:
-    """The path from the root, without "..", by its words alone: links are not followed."""
+    """Return the path from the root, without "..", by its words alone: links are not followed."""
     return Path(os.path.abspath(path))  # noqa: PTH100 - `Path.absolute` keeps ".."
 
 
@@ -244,7 +243,7 @@ def broken_link(path: Path) -> str:
 
 
 def read_stream(stream: BinaryIO | None, name: str) -> Source:
-    """The source in a stream; None is one that is closed. Raises DocumentError as `read_source`."""
+    """Read the source in a stream; None is a closed one. Raises DocumentError as `read_source`."""
     if stream is None:
         raise _unreadable(name, "this is closed: there is nothing to read")
     try:
@@ -255,9 +254,9 @@ def read_stream(stream: BinaryIO | None, name: str) -> Source:
 
 
 def _read_pipe(path: Path, name: str) -> bytes:
-    """What comes through a pipe (`<(command)` of a shell is one), once somebody writes to it.
+    """Read a pipe (`<(command)` of a shell is one), once a writer writes to it.
 
-    Opening it the ordinary way would wait for a writer without end.
+    An ordinary open would wait for a writer without end.
     """
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     with open(descriptor, "rb") as stream:  # noqa: PTH123 - a descriptor has no path
@@ -273,7 +272,7 @@ def _read_pipe(path: Path, name: str) -> bytes:
 
 
 def _first_bytes(descriptor: int) -> bytes | None:
-    """What is in a pipe; nothing when nobody writes to it, None when a writer is still thinking."""
+    """Return the first bytes in a pipe; b"" without a writer, None while a writer is silent."""
     try:
         return os.read(descriptor, MAX_BYTES)
     except BlockingIOError:
@@ -285,7 +284,7 @@ def _reason(error: Exception) -> str:
 
 
 def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
-    """The source in some bytes. Raises DocumentError when they are no usable text."""
+    """Make the source of some bytes. Raises DocumentError where they are no usable text."""
     if len(data) > MAX_BYTES:
         raise _unreadable(name, f"this is larger than {MAX_BYTES // 1024 // 1024} MiB")
     try:
@@ -309,13 +308,13 @@ def source_of(data: bytes, name: str, path: Path | None = None) -> Source:
 
 
 def unquoted(text: str) -> str | None:
-    """What stands inside of typographic quotes, where a text is in such quotes."""
+    """Return the text inside typographic quotes, where a text is in such quotes."""
     found = _QUOTED.fullmatch(text) if text[:1] in _QUOTES else None
     return None if found is None else found[1]
 
 
 def spoken(char: str) -> str:
-    """What to call a character that nobody sees."""
+    """Return the name of a character that nobody sees."""
     known = {"\t": "a tab", "\n": "a line break", "\x85": "U+0085 (next line)"}.get(char)
     return known or f"U+{ord(char):04X} ({unicodedata.name(char, 'no name').lower()})"
 

@@ -1,6 +1,14 @@
-"""What libyaml says about a text that is no YAML, in the words of somebody who wants to mend it.
+"""Reports of syntax errors, in words for an author who wants to mend the text.
 
-Looks at the line where reading stopped, never at the whole text: the rest may mean anything.
+libyaml stops at the first character that fits no rule of YAML, and names the rule, not the mistake.
+The mistake often stands earlier: a missing space behind a ':' makes a text of a key, and libyaml
+complains of the next ':' on the line below. `_explain` therefore asks for one typical mistake after
+the other, from the most certain to the least: a tab, a second ':', a text that a bracket cuts, a
+character behind a closed value, a line that begins in no column of an open block. libyaml's own
+words are the last answer.
+
+A syntax error leaves no nodes. All questions go to lines: to the line where libyaml stopped, to the
+line above it, and, for a column, to the keys and dashes of the lines above (`_opened_above`).
 """
 
 from __future__ import annotations
@@ -16,9 +24,9 @@ from bt_actions.document.yaml.source import Source
 
 _OPENS = re.compile("flow mapping|flow sequence|quoted scalar")
 _EXPECTED = ("expected key", "expected '-' indicator", "expected <document start>")
-"""What libyaml misses where a line is not indented as those that it belongs to."""
+"""libyaml's words for a line that is not indented as its siblings are."""
 _REACH = 200
-"""How much of a line is looked at, before and behind the place."""
+"""Characters of a line that are looked at, before and behind the place."""
 _BRACKETED = re.compile(r"""([^\s,:{}\[\]'"][^,:{}\[\]'"]*)(\[[^\[\]{}]*\]?)""")
 _ELEMENT = re.compile(r"(\$\w[\w.]*|\w+\.[\w.]+)\[(\d+)\]")
 _SHELL = re.compile(r"\$\{[^{}]*\}")
@@ -33,7 +41,7 @@ _QUOTES = {
 
 
 class _Said(NamedTuple):
-    """What is said about a mistake, and where."""
+    """One finding to be: its place and its words."""
 
     span: Span
     message: str
@@ -42,7 +50,7 @@ class _Said(NamedTuple):
 
 
 def report_syntax(source: Source, error: yaml.YAMLError) -> None:
-    """Report what libyaml raised. After it nothing can be read on."""
+    """Report libyaml's error. Nothing behind it can be read."""
     what = getattr(error, "context", None) or ""
     mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
     if "block scalar" in what or "simple key" in what:
@@ -57,7 +65,7 @@ def report_syntax(source: Source, error: yaml.YAMLError) -> None:
 
 
 def _opened(source: Source, error: yaml.YAMLError) -> Related | None:
-    """Where the brace, bracket or quote stands that is not closed, if it is that."""
+    """Return the place of a brace, bracket or quote that is never closed, if that is the error."""
     what, mark = getattr(error, "context", None) or "", getattr(error, "context_mark", None)
     if mark is None or not _OPENS.search(what):
         return None
@@ -95,7 +103,7 @@ def _explain(source: Source, problem: str, line: int, column: int) -> _Said:
 
 
 def _second_colon(source: Source, text: str, span: Span) -> _Said:
-    """A ':' where no key can stand: often the line above holds none that counts."""
+    """Explain a ':' where no key can stand: often the line above holds a key without a space."""
     before = text[: span.column - 1]
     above = next((at for at in range(span.line - 1, 0, -1) if source.lines[at - 1].strip()), 0)
     if ": " in before or not above:
@@ -111,7 +119,7 @@ def _second_colon(source: Source, text: str, span: Span) -> _Said:
 
 
 def _cut_text(problem: str, text: str, span: Span) -> _Said | None:
-    """A text that a bracket or a brace ends inside { } and [ ]: ``$a[0] > 2``, ``${a}``."""
+    """Explain a text that a bracket or a brace ends inside { } and [ ]: ``$a[0] > 2``, ``${a}``."""
     if "expected ','" not in problem and "cannot start any token" not in problem:
         return None
     at = span.column - 1
@@ -135,7 +143,7 @@ def _cut_text(problem: str, text: str, span: Span) -> _Said | None:
 
 
 def _behind(problem: str, text: str, span: Span) -> _Said | None:
-    """Something behind a quote, a brace or a bracket that has ended a value already."""
+    """Explain characters behind a quote, a brace or a bracket that has ended a value already."""
     at = span.column - 1
     if not text[at:].strip():
         return None
@@ -168,8 +176,7 @@ class _Open(NamedTuple):
 def _column_hint(source: Source, line: int) -> str | None:
     """Say where a line should begin: ``begin it in column 7, as the item in line 5 does``.
 
-    Goes by the lines alone, since what is no YAML has no nodes: each key and each dash above is
-    open until a line begins further to the left.
+    A key or a dash is open until a line begins further to the left.
     """
     text = source.line(line) or ""
     column = _indent(text) + 1
@@ -187,7 +194,7 @@ def _column_hint(source: Source, line: int) -> str | None:
 
 
 def _opened_above(source: Source, line: int) -> list[_Open]:
-    """What is open where a line begins, from the outside to the inside."""
+    """Return the open keys and dashes where a line begins, from the outside to the inside."""
     opened: list[_Open] = []
     for number, text in enumerate(source.lines[: line - 1], 1):
         at = _indent(text)

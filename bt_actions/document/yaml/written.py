@@ -1,9 +1,9 @@
-"""Where comments are, and where the characters of a scalar's text are written.
+"""Comments, and the places of a scalar's characters in the text.
 
-Asks what was composed, so that it agrees with libyaml: a '#' is a comment's wherever it stands in
-no scalar, and a part of a scalar is where libyaml's text is found in what was written.
-``# bt: ignore[BT301] reason`` silences a warning: on the line of what it silences, or alone on a
-line above it.
+libyaml tells neither. Both are found from composed scalars, so that they agree with libyaml: a '#'
+outside of all scalars begins a comment, and the characters of a scalar are found one after the
+other in the text. ``# bt: ignore[BT301] reason`` silences a warning: on the same line, or alone on
+a line above.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _SHORT = {'"': '"', "\\": "\\", "/": "/", " ": " ", "n": "\n", "t": "\t", "r": "
 
 
 class Comment(NamedTuple):
-    """A comment, from its '#' on; `alone` when nothing stands before it. Line and column from 1."""
+    """A comment, from its '#' on; `alone` without text before it. Line and column count from 1."""
 
     line: int
     column: int
@@ -40,12 +40,12 @@ class Comment(NamedTuple):
 
 
 def scalars_of(root: Node) -> Iterator[Scalar]:
-    """Every scalar of a node, as `walk` gives them."""
+    """Yield every scalar of a node, in the order of `walk`."""
     return (node for node in walk(root) if isinstance(node, Scalar))
 
 
 def _content_of(scalar: Scalar, source: Source) -> str:
-    """What is written on the first line of a scalar, behind its anchor and its tag."""
+    """Return the text on the first line of a scalar, behind its anchor and its tag."""
     written = (source.line(scalar.line) or "")[scalar.column - 1 :]
     while (match := _PROPERTY.match(written)) is not None:
         written = written[match.end() :]
@@ -53,13 +53,13 @@ def _content_of(scalar: Scalar, source: Source) -> str:
 
 
 def block_header(scalar: Scalar, source: Source) -> str:
-    """``|`` or ``>-`` and the like, where a scalar is a block; else nothing."""
+    """Return ``|``, ``>-`` and the like, where a scalar is a block; else ""."""
     written = "" if scalar.plain else _content_of(scalar, source)
     return written.split(" ")[0].split("\t")[0] if written[:1] in ("|", ">") else ""
 
 
 def comments_of(source: Source, scalars: Iterable[Scalar]) -> Iterator[Comment]:
-    """The comments of a text, in its order, given all of its scalars."""
+    """Yield the comments of a text, in its order, given all of its scalars."""
     lines = source.commented
     texts = sorted(
         _range(scalar, source)
@@ -76,16 +76,16 @@ def comments_of(source: Source, scalars: Iterable[Scalar]) -> Iterator[Comment]:
 
 
 def _range(scalar: Scalar, source: Source) -> tuple[tuple[int, int], tuple[float, float]]:
-    """Where a scalar begins and ends; behind the header of a block a comment may stand."""
+    """Return begin and end of a scalar; behind the header of a block a comment may stand."""
     is_block = block_header(scalar, source) != ""
     begin = (scalar.line + 1, 0) if is_block else (scalar.line, scalar.column)
     return begin, (scalar.end_line, scalar.end_column)
 
 
 def apply_ignores(source: Source, complete: Callable[[], bool]) -> None:
-    """Take the silenced findings out of a source, and report what is wrong with the ignores.
+    """Take the silenced findings out of a source, and report wrong ignores.
 
-    An ignore is an error where it names no rule, or an error, or silences nothing. `complete` says
+    An ignore that names no rule, or an error, or silences nothing, is an error. `complete` returns
     whether all rules were tried: else no ignore is called useless.
     """
     if "ignore" not in source.text or source.root is None:
@@ -110,12 +110,12 @@ def apply_ignores(source: Source, complete: Callable[[], bool]) -> None:
 
 
 def is_ignore(comment: Comment) -> bool:
-    """Whether a comment silences something."""
+    """Return whether a comment silences a rule."""
     return _IGNORE.search(comment.text) is not None
 
 
 def _targets(source: Source) -> Iterator[tuple[Comment, int]]:
-    """The comments that hold an ignore, each with the line that it is about."""
+    """Yield the comments that hold an ignore, each with the number of the line it is about."""
     assert source.root is not None
     comments = list(comments_of(source, scalars_of(source.root)))
     ignores = [comment for comment in comments if is_ignore(comment)]
@@ -127,7 +127,7 @@ def _targets(source: Source) -> Iterator[tuple[Comment, int]]:
 
 
 def _lines_below(source: Source, skipped: set[int]) -> list[int]:
-    """For each line the next one that says something; at the end the line itself."""
+    """Return for each line the next line with content; for the last such line itself."""
     found = list(range(len(source.lines) + 1))
     later = 0
     for number in range(len(source.lines), 0, -1):
@@ -138,7 +138,7 @@ def _lines_below(source: Source, skipped: set[int]) -> list[int]:
 
 
 def _codes(source: Source, comment: Comment) -> Iterator[tuple[str, Span]]:
-    """The rules that a comment names, each with its place; an ignore without one is reported."""
+    """Yield the rules that a comment names, with their places; report an ignore without a rule."""
     line, before = comment.line, comment.column - 1
     for match in _IGNORE.finditer(comment.text):
         if not (match[1] or "").strip():
@@ -164,7 +164,7 @@ def _can_be_silenced(source: Source, code: str, span: Span) -> bool:
 
 
 def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
-    """The range of a part of a scalar's text; the whole scalar where that cannot be told."""
+    """Return the range of a part of a scalar's text; of the whole scalar where no part is found."""
     chars = _decoded(node, source)
     if not chars:
         return span_of(node)
@@ -180,17 +180,17 @@ def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
 
 
 def _decoded(node: Scalar, source: Source) -> list[Char]:
-    """The characters of a text as they are written, or none where that cannot be told."""
+    """Return the characters of a text with their places, or none where these cannot be found."""
     if source.decoded is None or source.decoded[0] is not node:
         source.decoded = node, _found(node, source)
     return source.decoded[1]
 
 
 def _found(node: Scalar, source: Source) -> list[Char]:
-    """The characters of a text, looked for one after the other in what was written.
+    """Find the characters of a text one after the other in the lines of its scalar.
 
-    What is passed over is indentation, the second of two quotes, and whatever else says nothing.
-    A line break that is read as a space is found in the indentation behind it.
+    Indentation, the second of two quotes, and whatever else has no character in the text is passed
+    over. A line break that YAML reads as a space is found in the indentation behind it.
     """
     found: list[Char] = []
     content = _content_of(node, source)

@@ -1,4 +1,4 @@
-"""`sequence` and `fallback`: one child after the other, until one ends them all."""
+"""`sequence` and `fallback`: one child after the other, until a child ends the node."""
 
 from bt_actions.document.kinds.given import (
     Behaviour,

@@ -1,4 +1,4 @@
-"""`pipeline`: what comes first is done again while what comes later runs."""
+"""`pipeline`: earlier children begin again while a later child runs."""
 
 from collections.abc import Sequence
 
@@ -33,7 +33,7 @@ def _warn(hazards: Hazards, node: TreeNode, bounded: bool) -> None:
 
 
 def _unpaced(children: Sequence[TreeNode]) -> list[TreeNode]:
-    """The last child, and those before that nothing holds back after a success."""
+    """Return the last child, and earlier children that nothing holds back after a success."""
     found = []
     for child in children:
         inner = child

@@ -1,4 +1,4 @@
-"""`every`: how often what stands in a `pipeline`, or in a `repeat`, begins again."""
+"""`every`: how often a child of a `pipeline`, or of a `repeat`, begins again."""
 
 from bt_actions.document.kinds.given import Behaviour, Context, Hazards, TreeNode, decorators
 from bt_actions.document.language.kinds import Can, End, Group, decorator

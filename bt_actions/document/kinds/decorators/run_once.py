@@ -1,4 +1,4 @@
-"""`run_once`: one visit of what it holds, whose end is kept."""
+"""`run_once`: one visit of the child, whose end is kept."""
 
 from bt_actions.document.kinds.given import Behaviour, Context, TreeNode, leaving, py_trees
 from bt_actions.document.language.kinds import EITHER, End, decorator

@@ -1,4 +1,4 @@
-"""`timeout`: stops what it holds after some time."""
+"""`timeout`: an end of the child after some time."""
 
 from bt_actions.document.kinds.given import Behaviour, Context, Hazards, TreeNode, decorators
 from bt_actions.document.language.kinds import Can, End, Settings, decorator

@@ -1,4 +1,4 @@
-"""`action`: a goal, its type and server said in place or by a name under `actions`."""
+"""`action`: a goal, with type and server in place or by a name under `actions`."""
 
 from bt_actions.document.kinds.given import Behaviour, Context, TreeNode, action, parts, reading
 from bt_actions.document.language.keys import ACTION_NAME, ACTION_TYPE, DOING, GATES
@@ -34,7 +34,7 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
 
 
 _OWN = ("goal", *SAVES, *GATES)
-"""What a node of an action may have, and share the rest with others of the action."""
+"""Keys of an action's node that leave the rest to be shared with others of the action."""
 KIND = leaf(
     "action",
     NodeName(),

@@ -10,7 +10,7 @@ from bt_actions.document.yaml.nodes import Node, span_of
 
 
 def _build(node: TreeNode, context: Context) -> Behaviour:
-    """What cannot be made is reported to the document's source, and `Failure` stands for it."""
+    """Make a behaviour; report a failure to the document's source, and return `Failure` instead."""
     from bt_actions.document.language.classes import ClassError, make_behaviour, refusal
 
     path = text_of(node.values, "python")

@@ -86,7 +86,7 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
 
 
 def _static(node: TreeNode, included: Document, outer: Mapped[str, object]) -> dict[str, object]:
-    """The inputs of an included tree that are known before it runs, from those of this one."""
+    """Return the inputs of an included tree that are known before the tree runs."""
     inputs = included.inputs.items()
     found = {name: each.values["default"] for name, each in inputs if "default" in each.values}
     for name, value in table_of(node.values.get("with")).items():
@@ -99,7 +99,7 @@ def _static(node: TreeNode, included: Document, outer: Mapped[str, object]) -> d
 
 
 def _writes(document: Document, nodes: Iterable[TreeNode]) -> set[str]:
-    """The names of the variables that some nodes of a tree write."""
+    """Return the names of the variables that some nodes of a tree write."""
     return {each.name for node in nodes for each in writes_of(node, document)}
 
 
@@ -154,7 +154,7 @@ def _computed_inputs(checker: Checker, included: Document, given: Computed, kind
 
 
 def _input_type(checker: Checker, included: Document, name: str, at: Node) -> FieldType | None:
-    """The type of an input of an included tree, which is reported if it has none of that name."""
+    """Return the type of an included tree's input; report an input that the tree does not have."""
     declared = included.inputs.get(name)
     if declared is None:
         if not checker.doubts_of(included).declares(name):
