@@ -1,6 +1,6 @@
 """A behaviour-tree task orchestrator for ROS 2 actions. These names are the public ones.
 
-Each is imported when it is first asked for: a program pays for what it uses.
+A name is imported when a program first asks for it: a program pays for what it uses.
 """
 
 import sys as _sys

@@ -1,7 +1,7 @@
-"""The one door to ROS: from a node, or nothing, to what leaves and runs work with.
+"""The one door to ROS: from a node, or nothing, to the tools of leaves and runs.
 
-Behaviours and runs ask here. rclpy is imported with the first question, not before: trees are
-loaded, checked and drawn without it. Nothing is kept or decided here.
+Behaviours and runs ask here. The first question imports rclpy, not the import of this file: trees
+are loaded, checked and drawn without it. Nothing is kept or decided here.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 
 def backend_of(node: Any) -> Backend:
-    """Return what a node gives; what is a Backend itself is returned as it is.
+    """Return the Backend of a node; a Backend itself is returned as it is.
 
-    Raises TypeError where it is neither.
+    Raises TypeError for neither.
     """
     if isinstance(node, Backend):
         return node
@@ -40,7 +40,7 @@ def backend_of(node: Any) -> Backend:
 
 
 def spinner(died: Callable[[], None], *, may_share: bool, **given: Any) -> Spinner:
-    """Return a node that is spun: of all who may share and give nothing it is one.
+    """Return a node that is spun: one for all who may share it and bring nothing.
 
     See ros/spinning.py.
     """
@@ -62,14 +62,14 @@ def ended_by_signals(
 
 
 def log() -> Log:
-    """Return the log of this package, which is written without holding up anybody."""
+    """Return the log of this package, whose writing holds up nobody."""
     from bt_actions.ros.log import log
 
     return log
 
 
 def rosout(node: Any) -> Rosout:
-    """Return what speaks on `/rosout` for a node, and prints nothing."""
+    """Return a publisher of lines on `/rosout` for a node, which prints nothing."""
     from bt_actions.ros.rosout import Rosout
 
     return Rosout(node)

@@ -1,21 +1,24 @@
 """The transport of an action over rclpy: loses no answer, and can be read without an executor.
 
-rclpy's client hands out a future for each request and completes it where it spins. Three things
-follow that this project cannot live with, and each has its cure here:
+rclpy's client hands out a future for each request and completes it where it spins. This project
+cannot live with three consequences, and each has its cure here:
+
 - An answer may arrive before the request's sequence number has been filed, where the sender is
-  not the executor's thread; it is then dropped ("Ignoring unexpected goal response", rclpy #1123).
-  Sending with filing, and taking, are each done under one lock.
+  not the executor's thread; rclpy then drops it ("Ignoring unexpected goal response", rclpy #1123).
+  Here one lock covers the sending with the filing, and another hold of it the taking.
 - The done-callbacks of futures are tasks of the executor: where nobody spins any more, they never
   run. Here answers go straight to a listener, and `deliver_arrived` takes them from any thread.
 - Futures of requests that are never answered are kept for ever. Here `forget` drops them.
-And one that matters where two servers have one name: the first answer is all that rclpy hears. Here
-every answer to a question is told, with those before it.
 
-What is taken waits in one inbox and is delivered in its order by whoever comes first: the thread
-of receiving.py, or a call of `deliver_arrived`, after which nothing that had arrived before is
-still under way.
+A fourth consequence matters where two servers have one name: rclpy hears the first answer alone.
+Here every answer to a question is told, with those before it.
 
-It carries messages and decides nothing. It uses the low-level handle of rclpy's ActionClient.
+Taken answers wait in one inbox, and are delivered in order by the first thread that comes: the
+thread of receiving.py, or a caller of `deliver_arrived`, after which nothing that had arrived
+before is still under way.
+
+The transport carries messages and decides nothing. It uses the low-level handle of rclpy's
+ActionClient.
 """
 
 from __future__ import annotations
@@ -46,16 +49,18 @@ from bt_actions.utilities.plain_text import raised
 FEEDBACK_AT_MOST = 200
 """Messages of feedback taken at a time, so that a flood of them starves nobody."""
 DEPTH = 100
-"""Of our end of the services; with the default of 10 a burst of answers is lost silently."""
+"""The depth of our end of the services; with the default of 10 a burst of answers is lost silently.
+"""
 
 ASKED_KEPT = ANSWERS_KEPT = 10
-"""Questions of one kind about one goal whose answers are waited for: the newest; and the answers to
-one that are told: more servers of one name answer nothing new."""
+"""The newest questions of one kind about one goal that wait for answers, and the answers to one
+that are told: more servers of one name answer nothing new.
+"""
 
 
 @dataclass(slots=True)
 class _Question:
-    """A request that was sent, and what came back."""
+    """A sent request, and its answers."""
 
     goal_id: bytes
     asked: float = field(default_factory=time.monotonic)
@@ -80,15 +85,15 @@ class RosTransport:
         self.seen_since = seen_since
         self._on_close = on_close
         self._questions: dict[tuple[Request, int], _Question] = {}
-        """By their kind, and rclpy's number of each."""
+        """Questions by their kind, and rclpy's number of each."""
         self._past: dict[tuple[Request, int], _Question] = {}
         """The goal requests of goals that were forgotten."""
         self._inbox: deque[tuple[Callable[..., None], tuple[Any, ...], float | None]] = deque()
-        """Whom to tell what, and when that was asked for."""
+        """Calls of the listener, each with the moment of its question."""
         self.reachability = Reachability()
         """Under the one lock, as all requests."""
         self.beside_another = False
-        """The listener has another client, and hears of feedback by that alone."""
+        """Whether the listener has another client, and hears of feedback by that alone."""
         self.closed = False
         check_for_type_support(action_type)
         self._impl = action_type.Impl
@@ -173,7 +178,7 @@ class RosTransport:
                     put((tell.statuses_came, (read_statuses(message),), None))
 
     def _file(self, kind: Request, number: int, answer: Any) -> None:
-        """Put an answer into the inbox, with those before it; none that nobody waits for."""
+        """Put an answer into the inbox, with those before it; drop one that nobody waits for."""
         key = kind, number
         question = self._questions.get(key) or self._past.get(key)
         if question is None or len(question.answers) >= ANSWERS_KEPT:
@@ -183,7 +188,7 @@ class RosTransport:
         self._inbox.append((self._listener.answer_came, told, question.asked))
 
     def deliver(self) -> None:
-        """Deliver what has been taken."""
+        """Deliver the inbox."""
         with host.lock:
             any_came = bool(self._inbox)
             while self._inbox and not self.closed:

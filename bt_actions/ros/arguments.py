@@ -1,7 +1,7 @@
-"""What `--ros-args` give a node, asked of rcl before there is that node.
+"""The parameters that `--ros-args` give a node, asked of rcl before there is that node.
 
-rcl reads the words, and says what they give a node of a name and a namespace. So the node that asks
-has those of the node to come. Here is decided nothing but whom a parameter is meant for.
+rcl reads the words, and says what they give a node of a name and a namespace. So the asking node
+has those of the node to come. This file decides only whom a parameter is meant for.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ PARAMETER = ("-p", "--param")
 FILE = "--params-file"
 _OF_EVERY_NODE = frozenset({"use_sim_time", "start_type_description_service"})
 _SETTLED = [Parameter(name, value=False) for name in sorted(_OF_EVERY_NODE)]
-"""So that a node that only asks can be made whatever is given for them."""
+"""Overrides for an asking node, which can then be made whatever the words give."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,21 +32,22 @@ class Given:
     """The parameters that words give a node, without those that every node has."""
 
     node: str = ""
-    """Its full name, as remapping rules have it."""
+    """The node's full name after remapping."""
     values: Mapping[str, object] = field(default_factory=dict)
-    """An empty list is one, whatever it is a list of."""
+    """The values; an empty list has no type of its items."""
     written: Mapping[str, str] = field(default_factory=dict)
     """The text of each value that `-p` gives."""
     shared: frozenset[str] = frozenset()
-    """Those that a file gives to other nodes, too."""
+    """The parameters that a file gives to other nodes, too."""
     unused: Sequence[tuple[str, str]] = ()
     """Each `-p` and `--params-file` that gives this node nothing, with its word."""
 
 
 def given_by(words: Sequence[str], name: str, namespace: str = "") -> Given:
-    """Return what `words` give to a node of this name, before remapping, and namespace.
+    """Return the parameters that `words` give to a node.
 
-    Raises ValueError, with a remedy, for words that rcl does not understand.
+    `name` and `namespace` are the node's, before remapping. Raises ValueError, with a remedy, for
+    words that rcl does not understand.
     """
     asks = {"args": ["--ros-args", *words], "parameter_overrides": _SETTLED}
     with _understood(), passing_node(name, namespace=namespace, **asks) as node:
@@ -84,7 +85,7 @@ def _sources(words: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 
 def _given_alone(beside: Node, name: str, option: str, word: str) -> dict[str, Parameter]:
-    """Return what one option gives to a node of some name, beside another."""
+    """Return the parameters that one option gives to a node of some name, beside another."""
     node = Node(
         name,
         context=beside.context,
@@ -110,7 +111,7 @@ def _without_common(found: dict[str, Parameter]) -> dict[str, Parameter]:
 
 @contextlib.contextmanager
 def _understood() -> Iterator[None]:
-    """Say in our words what rcl says in those of its lexer, which it also logs."""
+    """Turn rcl's words about a wrong argument into ours; rcl also logs its own."""
     set_logger_level("rcl", LoggingSeverity.FATAL)
     try:
         yield
@@ -127,7 +128,7 @@ def _understood() -> Iterator[None]:
 
 
 def _in_our_words(text: str) -> str:
-    """Return what is wrong with a word of `--ros-args`, and how it is written."""
+    """Return what is wrong with a word of `--ros-args`, and the right notation."""
     told = re.sub(r", at /.*", "", text).partition(": ")[2] or text
     rule = re.match(r"Couldn't parse (remap|parameter override) rule: '(-\S+ (.*?))'\.", told)
     namespace = "a namespace has letters, digits and _, each part after a slash, as in"

@@ -1,7 +1,7 @@
 """The two clocks of a node as seconds: the steady one, and the node's own.
 
-Where no simulated time is in force the node's own clock is the steady one too, so that a wall clock
-that is set moves no deadline. Holds no deadline itself.
+Without simulated time the node's own clock is the steady one too, so a change of the wall clock
+moves no deadline. Holds no deadline itself.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from bt_actions.goals.terms import Now
 from bt_actions.ros.log import log
 
 MOMENT = 2.0
-"""Seconds for which simulated time may not have begun until that is said."""
+"""Seconds without simulated time after which a warning follows."""
 
 
 class Clocks:
-    """Reads both clocks of one node; going over to simulated time and back leaves no jump."""
+    """Reads both clocks of one node; a change to simulated time and back leaves no jump."""
 
     def __init__(self, node: Any) -> None:
         self._clock = node.get_clock()
@@ -49,7 +49,7 @@ class Clocks:
             return Now(steady, self._last)
 
     def stamp(self) -> int:
-        """The node's own clock in nanoseconds, as the headers of messages have it."""
+        """Return the node's own clock in nanoseconds, as the headers of messages have it."""
         with (handle := self._clock.handle):  # `now` makes objects for three times the time
             return int(handle.get_now().nanoseconds)
 

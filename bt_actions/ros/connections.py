@@ -1,7 +1,7 @@
-"""What leaves have on a node: topics that they listen to and speak on, services that they call.
+"""The connections of leaves on a node: subscriptions and publishers of topics, clients of services.
 
-Whoever is called with a message or an answer only takes note of it; nothing of the tree runs there.
-Decides nothing, neither how long to wait nor whether to ask again.
+A callback for a message or an answer only takes note; nothing of the tree runs there. This file
+decides nothing: neither how long to wait nor whether to ask again.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ listens. Up to 2.8 s were measured.
 
 
 def qos_profile(name: str) -> QoSProfile:
-    """The quality of service that a tree calls by this name. Raises KeyError."""
+    """Return the quality of service that a tree calls by this name. Raises KeyError."""
     return {
         "default": QoSProfile(depth=10),
         "sensor": qos_profile_sensor_data,
@@ -57,7 +57,7 @@ def qos_profile(name: str) -> QoSProfile:
 
 @contextlib.contextmanager
 def _one_type(node: Node, kind: type, name: str) -> Iterator[None]:
-    """Tell in the tree's words why rclpy cannot make something, where the name has another type."""
+    """Turn rclpy's error for a name with another type into the tree's words."""
     try:
         yield
     except RuntimeError as error:  # RCLError, which is public nowhere
@@ -70,7 +70,7 @@ def _one_type(node: Node, kind: type, name: str) -> Iterator[None]:
 
 
 class _Topic:
-    """What a subscription and a publisher have in common."""
+    """The common part of subscriptions and publishers."""
 
     listens: bool
 
@@ -83,11 +83,11 @@ class _Topic:
         """The topic's full name."""
 
     def may_come(self) -> float:
-        """Seconds for which the node may not be shown yet who was there before it."""
+        """Return the seconds in which earlier participants may still be undiscovered."""
         return max(0.0, self._discovered_at - time.monotonic())
 
     def why_nobody(self) -> str:
-        """What the graph shows that explains why nobody publishes, or listens; or ""."""
+        """Return the graph's reason why nobody publishes, or listens; or ""."""
         node, kind, listens = self._node, interface_name(self._type), self.listens
         with contextlib.suppress(Exception):  # our node was destroyed
             look = "publishers" if listens else "subscriptions"
@@ -99,7 +99,7 @@ class _Topic:
 
 
 class RosSubscription(_Topic):
-    """That of a leaf; the Subscription of traffic/backend.py."""
+    """A leaf's Subscription (traffic/backend.py)."""
 
     listens = True
 
@@ -123,9 +123,9 @@ class RosSubscription(_Topic):
         self.name = self._subscription.topic_name
 
     def may_come(self) -> float:
-        """Seconds for which a first message may be on its way; 0 afterwards.
+        """Return the seconds in which a first message may be on its way; 0 afterwards.
 
-        Its publisher may not be discovered yet, or has only just been.
+        Its publisher may still be undiscovered, or has only just been discovered.
         """
         matched = self._subscription.get_publisher_count() > 0
         arrives = self._made_at + ARRIVES - time.monotonic() if matched else 0.0
@@ -136,7 +136,7 @@ class RosSubscription(_Topic):
 
 
 class RosPublisher(_Topic):
-    """That of a leaf; the Publisher of traffic/backend.py."""
+    """A leaf's Publisher (traffic/backend.py)."""
 
     listens = False
 
@@ -159,7 +159,7 @@ class RosPublisher(_Topic):
         self._has_all_by = time.monotonic() + ARRIVES
 
     def close(self) -> None:
-        """Destroy the publisher, once its listeners have all, or a second after the last message.
+        """Destroy the publisher once all listeners have its messages, a second later at most.
 
         rclpy's own wait holds up all threads of Python.
         """
@@ -172,7 +172,7 @@ class RosPublisher(_Topic):
 
 
 class RosService:
-    """A client of a leaf; the Service of traffic/backend.py."""
+    """A leaf's Service (traffic/backend.py): a client of one."""
 
     def __init__(self, node: Node, service_type: type, name: str) -> None:
         self._node = node

@@ -1,7 +1,7 @@
 """The middleware's settings for processes of our own; to be called before ROS is first touched.
 
-What the user has set is never overridden, but how far a simulation is seen that was asked to be
-private. Does not import rclpy.
+A user's setting is never overridden, but for the reach of a simulation that is to be private.
+Does not import rclpy.
 """
 
 from __future__ import annotations
@@ -18,32 +18,33 @@ PROFILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 _PROFILES = (PROFILE, "FASTDDS_DEFAULT_PROFILES_FILE")
 SHARED = "/dev/shm"  # nosec B108
 _SEGMENT = "fastrtps_"
-"""Where Linux has the memory that processes share, and how names of Fast DDS's begin there."""
+"""The beginning of the names of Fast DDS's memory, in Linux' folder of shared memory."""
 _TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 _IN_THIS_FOLDER = ("DEFAULT_FASTRTPS_PROFILES.xml", "DEFAULT_FASTDDS_PROFILES.xml")
 _RANGES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS")
 
 
 class Reach(Enum):
-    """How far a process may see and be seen, in ROS_AUTOMATIC_DISCOVERY_RANGE's words."""
+    """How far a process sees and is seen, in ROS_AUTOMATIC_DISCOVERY_RANGE's words."""
 
     NETWORK = ""
     MACHINE = "LOCALHOST"
     """For simulated servers: they carry the names of real ones, and would be mistaken for them."""
     PROCESS = "OFF"
-    """For a tree with its own simulated servers, which must not be taken for those of a real robot
-    nearby, nor these for them: it is private, whatever the user has set for robots."""
+    """For a tree with its own simulated servers: a tree must not take those of a real robot nearby
+    for them, nor another tree these for real ones. Private whatever the user has set for robots.
+    """
 
 
 def sees_nobody_else() -> bool:
-    """Whether a node that is made now sees those of this process alone."""
+    """Return whether a node made now sees those of this process alone."""
     return os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE") == Reach.PROCESS.value
 
 
 def prepare(reach: Reach = Reach.NETWORK) -> None:
-    """Let others notice within 3 s when this process dies, and set how far it may be seen.
+    """Let others notice this process' death within 3 s, and set how far it is seen.
 
-    It talks over UDP alone: processes that are killed hold up others in Fast DDS's shared memory,
+    Messages go over UDP alone: killed processes hold up others in Fast DDS's shared memory,
     whatever their domain (docs/reliability-settings.md). With Reach.MACHINE, rmw_fastrtps insists
     on shared memory besides.
     """
@@ -58,7 +59,7 @@ def prepare(reach: Reach = Reach.NETWORK) -> None:
 
 
 def keep_log() -> None:
-    """Have ROS's log in a temporary folder where nothing can be written in the user's home.
+    """Put ROS's log into a temporary folder where the user's home cannot be written.
 
     Without a log no ROS program starts. A ROS_LOG_DIR that the user has set stands.
     """
@@ -76,7 +77,8 @@ def keep_log() -> None:
 def of_other_users() -> str:
     """Say, as the end of a sentence, why a server in sight may not hear us, nor we it; or "".
 
-    It is a guess: processes of another user are there, and Fast DDS talks to all in shared memory.
+    The answer is a guess: processes of another user run, and Fast DDS talks to all in shared
+    memory.
     """
     with contextlib.suppress(OSError):  # one has gone meanwhile, say
         segments = [each for each in os.scandir(SHARED) if each.name.startswith(_SEGMENT)]

@@ -1,4 +1,4 @@
-"""What is done with goals when the process ends: by itself, by a signal, or as the child of a fork.
+"""The end of the process, and its goals: by itself, by a signal, or as the child of a fork.
 
 Sends nothing but what a drain does.
 """
@@ -50,6 +50,6 @@ def close_process() -> None:
 
 
 def disown() -> None:
-    """In the child of a fork: the goals are the parent's, and so is what guards them."""
+    """Let go of all goals in the child of a fork: they and their guards are the parent's."""
     atexit.unregister(close_process)
     host.disown()

@@ -1,7 +1,7 @@
-"""What a node sees of an action's servers in the ROS graph, and what is known of the node itself.
+"""A node's view of an action's servers in the ROS graph, and the state of the node itself.
 
-A server is known by the GID of its reader of goal requests: who has one takes what is sent, from
-the moment on that it is shown; the rest of a server that opens follows (within 18 ms, in 12
+A server is known by the GID of its reader of goal requests: from the moment the graph shows the
+reader, the server gets requests. The rest of an opening server follows (within 18 ms, in 12
 openings). Services are pairs of DDS topics, whose names are those of ROS 2's middlewares for DDS;
 of another middleware this graph would show no server.
 """
@@ -16,9 +16,9 @@ from rclpy.node import Node
 
 
 def servers(node: Node, action: str) -> frozenset[bytes]:
-    """Return the GIDs of the servers of an action, as far as this node knows by now.
+    """Return the GIDs of the servers of an action that this node knows by now.
 
-    Raises InvalidHandle when the node was destroyed.
+    Raises InvalidHandle where the node was destroyed.
     """
     service = node.resolve_service_name(f"{action}/_action/send_goal")
     with node.handle:  # the node's own method makes more objects of it, in thrice the time
@@ -29,9 +29,9 @@ def servers(node: Node, action: str) -> frozenset[bytes]:
 
 
 def is_valid(node: Node) -> bool:
-    """Whether the node is there, and its context was not shut down.
+    """Return whether the node is there, and its context was not shut down.
 
-    Asked without the lock of its context, which rclpy holds while it calls back on shutdown.
+    The lock of the context is not taken: rclpy holds it while it calls back on shutdown.
     """
     try:
         context = node.context.handle
@@ -42,7 +42,7 @@ def is_valid(node: Node) -> bool:
 
 
 def is_shut_down(node: Node) -> bool:
-    """Whether the context of a node was shut down, as by Ctrl-C; asked as `is_valid` does it."""
+    """Return whether a node's context was shut down, as by Ctrl-C; takes no lock, as `is_valid`."""
     try:
         context = node.context.handle
         with context:
@@ -52,9 +52,9 @@ def is_shut_down(node: Node) -> bool:
 
 
 def enclave(node: Node) -> str:
-    """Return the SROS 2 enclave of a node of ours, by whatever way it was given.
+    """Return the SROS 2 enclave of a node of ours, whatever set it.
 
-    Without any, and of a node that was destroyed, it is "/", as rcl has it.
+    Without any, and of a destroyed node, the enclave is "/", as in rcl.
     """
     with contextlib.suppress(Exception):
         mine = node.get_name(), node.get_namespace()

@@ -17,12 +17,12 @@ from bt_actions.utilities.ids import new_id
 from bt_actions.utilities.plain_text import raised
 
 LINGER = 5.0
-"""Seconds without an open goal until its thread ends; to start one for each goal costs more."""
+"""Seconds without an open goal until the thread ends; one for each goal would cost more."""
 _SINCE_BOOT = getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC)
 
 
 class RosHost:
-    """What the goals of this process have in common."""
+    """The common ground of all goals of this process."""
 
     def __init__(self) -> None:
         self.steady, self.new_goal_id = time.monotonic, new_id
@@ -32,7 +32,7 @@ class RosHost:
         self.wait, self.notify_all = changed.wait, changed.notify_all
         self.log = log
         self.record = Record()
-        """Replaced in wiring.py by one that is kept."""
+        """The record; wiring.py puts one that is kept in its place."""
         self.stalls = Stalls(_idle, lambda _: time.monotonic())
         self.scheduler = Scheduler(
             self.steady,
@@ -44,7 +44,7 @@ class RosHost:
         self.forks = 0
         self.closing = False
         self.domains: dict[int, Domain] = {}
-        """Those of ROS that goals were ever begun in, by their numbers."""
+        """The domains of ROS that goals were ever begun in, by their numbers."""
         self._bell = threading.Condition(self.lock)
         self._thread: threading.Thread | None = None
 
@@ -61,7 +61,7 @@ class RosHost:
             self.stalls.rests(self.steady())
 
     def disown(self) -> None:
-        """In the child of a fork: the goals are the parent's, and so is what guards them."""
+        """Let go of all goals in the child of a fork: they and their guards are the parent's."""
         self.forks += 1
         self.lock._at_fork_reinit()  # type: ignore[attr-defined]  # noqa: SLF001 - as threading does
         self.scheduler.clear()
@@ -99,4 +99,4 @@ def _idle(_: float) -> float:
 
 
 host = RosHost()
-"""The one of this process."""
+"""The host of this process."""

@@ -1,8 +1,8 @@
-"""Why a topic or a service finds nobody, in words, of what the ROS graph shows.
+"""The reason why a topic or a service finds nobody, in words, from the ROS graph.
 
-What is there in vain is told first: another type, or a quality of service that does not match; then
-one of the same type in another namespace. The texts follow a name and go on as a sentence. Looked
-at only where a reason is given.
+A useless find is told first: one of another type, or with a quality of service that does not match;
+then one of the same type in another namespace. The texts follow a name and go on as a sentence. The
+graph is asked only where a reason is given.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from bt_actions.utilities.suggest import listing
 def mismatch(
     kind: str, qos: QoSProfile, others: Sequence[TopicEndpointInfo], *, publish: bool
 ) -> str:
-    """Say why the others on our topic, who `publish` or else subscribe, do not match; or ""."""
+    """Say why the others on our topic, which `publish` or else subscribe, do not match; or ""."""
     theirs = "what is published there" if publish else "what is asked for there"
     if not others:
         return "nobody publishes on it" if publish else ""

@@ -1,8 +1,8 @@
 """The log of goals, runs and trees: Python's logger `bt_actions`, called on a thread of its own.
 
-Most of it is told under the one lock. Whoever reads standard error may stop to read: then the log
+Most lines come in under the one lock. A reader of standard error may stop to read: then the log
 waits, and nothing else does. rclpy's own loggers would hold up the whole process, so only a tree's
-lines go to them, because of `/rosout`. Where too much waits, newer lines are only counted.
+lines go to them, because of `/rosout`. Beyond a bound, newer lines are only counted.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from bt_actions.utilities.shorten import fit
 MOST = 10_000
 """Lines that wait to be written."""
 WITHIN = 1.0
-"""Seconds for which `flush` waits."""
+"""Seconds of the wait in `flush`."""
 LONGEST = 3000
-"""Bytes of a tree's line; a pipe that has room at all has room for 4,096."""
+"""Bytes of a tree's line; a pipe with any room has room for 4,096."""
 LINE = 250
-"""Characters of one of ours: with what stands before it, three lines of a terminal."""
+"""Characters of a line of ours: with the words before it, three lines of a terminal."""
 STDERR = 2
 
 
@@ -79,7 +79,7 @@ class Log:
         self._put(partial(self._write_by, name, LEVELS[level]), text)
 
     def flush(self) -> None:
-        """Wait until all that was said is written; not for long, and in vain only once."""
+        """Wait until all lines are written; not for long, and in vain only once."""
         done = self._lines.all_tasks_done
         with done:
             if not done.wait_for(lambda: not self._lines.unfinished_tasks, self._patience):

@@ -1,7 +1,7 @@
-"""Nodes of our own. That of a run has a valid name that no other is seen to have already.
+"""Nodes of our own. The node of a run gets a valid name that no other node has, as far as is seen.
 
-A node cannot be renamed, and what a participant sees of the graph comes bit by bit. So the context
-is opened before its node is needed, and what it has seen by then counts; nobody waits for more.
+A node cannot be renamed, and a participant sees the graph bit by bit. So the context is opened
+before its node is needed, and the graph seen by then counts; nobody waits for more.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from bt_actions.ros.log import log
 from bt_actions.ros.workarounds import participant
 
 SEND_GOAL = "/_action/send_goal"
-"""What the name of an action's service for goals ends with."""
+"""The end of the name of an action's service for goals."""
 LONGEST = 100
-"""Characters of a node's name, which the names of its services begin with."""
+"""Characters of a node's name, which begins the names of its services."""
 
 
 def overrides(node: Node) -> dict[str, Parameter]:
@@ -45,7 +45,7 @@ def where(node: Node) -> dict[str, str]:
 
 
 def node_name(tree: str) -> str:
-    """`bt_actions_` and the name of a tree, as a node may be called.
+    """Return a name for a node: `bt_actions_` and the name of a tree.
 
     Letters with marks lose them; others become ``u`` and their code point, as in ``u90e8``.
     """
@@ -59,7 +59,7 @@ def open_context(
 ) -> None:
     """Initialise a context with these words, or with the program's; raises what rclpy raises.
 
-    A byte that is no UTF-8, as names of files may have it, is escaped: rclpy reads all words.
+    A byte that is no UTF-8, as in names of files, is escaped: rclpy reads all words.
     """
     keep_log()
     words = sys.argv if words is None else words
@@ -90,7 +90,7 @@ def own_node(
 
 @contextlib.contextmanager
 def passing_node(name: str, **given: Any) -> Iterator[Node]:
-    """Have a node as `own_node` makes it, which is gone afterwards."""
+    """Yield a node as `own_node` makes it, and take it away afterwards."""
     node = own_node(name, **given)
     try:
         yield node
@@ -110,16 +110,16 @@ def server_name(node: Node, action: str) -> str:
 
 
 def server_names(actions: Iterable[str], name: str, namespace: str = "") -> list[str]:
-    """Return the servers that a node to come has for actions; for a moment there is another.
+    """Return the servers that a node to come has for actions; a second node is there for a moment.
 
-    `name` and `namespace` are that node's, before remapping. Raises what rclpy raises.
+    `name` and `namespace` are the first node's, before remapping. Raises what rclpy raises.
     """
     with passing_node(name, namespace=namespace) as node:
         return sorted({server_name(node, each) for each in actions})
 
 
 def warn_of_remapping(node: Node, action: str) -> None:
-    """Say it where a rule would have an action another full name: ROS remaps no action."""
+    """Warn of a rule that would give an action another full name: ROS remaps no action."""
     name: str = expand_topic_name(action, node.get_name(), node.get_namespace())
     other, part = node.resolve_service_name(name), name + SEND_GOAL
     if other != name and node.resolve_service_name(part) == part:
@@ -131,27 +131,27 @@ def warn_of_remapping(node: Node, action: str) -> None:
 
 
 class Outlook:
-    """A context of our own that looks at the graph before it has the node that it is for."""
+    """A context of our own that looks at the graph before its node is made."""
 
     def __init__(self) -> None:
-        """Raises what rclpy raises where ROS cannot start."""
+        """Open the context. Raises what rclpy raises where ROS cannot start."""
         self._node = own_node(f"bt_actions_{os.getpid()}_outlook", use_global_arguments=False)
         self.context: Context = self._node.context
 
     def hand_over(self) -> None:
-        """Leave the context to the node that was made in it meanwhile."""
+        """Leave the context to the node that was made in it."""
         self._node.destroy_node()
 
     def close(self) -> None:
-        """Take it away, where it was not handed over."""
+        """Take the context away, where it was not handed over."""
         participant.close(self._node)
 
 
 def named_node(name: str, context: Context, namespace: str) -> Node:
-    """A new node; its name has a number behind it where another node is seen to have it already.
+    """Return a new node; a number follows its name where another node is seen to have the name.
 
-    One that was given by ``__node:=`` stands as it is. There is a warning in both cases. Parameters
-    are those of the name without a number.
+    A name given by ``__node:=`` stands as it is. Both cases give a warning. Parameters are those
+    of the name without a number.
     """
     wanted, taken, given = name, "", list[Parameter]()
     for number in itertools.count(2):

@@ -1,4 +1,4 @@
-"""A node as traffic/ sees it (transport.Participant), and as leaves do (backend.Backend).
+"""A node in the roles of traffic/ (transport.Participant) and of leaves (backend.Backend).
 
 Names, clocks, topics, services and the graph of rclpy; decides nothing about a goal.
 """
@@ -39,18 +39,20 @@ _ON_NODE = "_bt_actions_participant"
 
 
 class _Sight:
-    """That of a context, as long as any of its nodes is there: the next one gets a new one.
+    """The sight of a context, as long as any of its nodes is there: the next node gets a new one.
 
-    Or the same, where the user has another node there, of which nobody tells us.
+    A node of the user in the same context may keep the old sight alive, which nobody tells us.
     """
 
     def __init__(self, before: _Sight | None) -> None:
         self.since = host.steady()
-        """Since when it is known here; a new one has dropped no server yet."""
+        """The moment at which the context became known here; a new one has dropped no server yet.
+        """
         now = host.stalls.long_times
         self.long_stalls: int = now if before is None else before.long_stalls
-        """How often this process had stood still for long by then: it may hear nothing where an
-        endpoint is made after more of them."""
+        """The number of this process' long stalls by then: after more of them, an endpoint may hear
+        nothing.
+        """
         self.nodes: weakref.WeakSet[Node] = weakref.WeakSet()
 
 
@@ -58,12 +60,12 @@ _sights: weakref.WeakKeyDictionary[Any, _Sight] = weakref.WeakKeyDictionary()
 
 
 class NodeParticipant:
-    """What goals and leaves see and hear through one node; there is one of each node."""
+    """The sight and hearing of goals and leaves through one node; each node has one."""
 
     randomness = random.Random()
 
     def __init__(self, node: Node) -> None:
-        """The caller holds the lock."""
+        """Make the one of a node; the caller holds the lock."""
         self.node = node
         clocks = Clocks(node)
         self.now, self.stamp = clocks.now, clocks.stamp
@@ -117,7 +119,7 @@ class NodeParticipant:
         return self._servers[action]
 
     def open_transport(self, action_type: Any, name: str, listener: Listener) -> RosTransport:
-        """Become a client of an action, by the name that rules may remap the parts of."""
+        """Open a client of an action, under the name whose parts rules may remap."""
         action = self._asked_by.get(name, name)
         is_private = sees_nobody_else()  # no server can come to be seen later than another
         seen_since = NEVER if is_private else self.seen_since
@@ -135,7 +137,7 @@ class NodeParticipant:
         return enclave(self.node)
 
     def _is_one_server(self, name: str) -> bool:
-        """Whether all parts of an action, as rules of this node lead them, are of one server."""
+        """Return whether remapping rules lead all parts of an action to one server."""
         parts = {
             self.node.resolve_topic_name: ("status", "feedback"),
             self.node.resolve_service_name: ("send_goal", "cancel_goal", "get_result"),

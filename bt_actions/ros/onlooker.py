@@ -1,7 +1,7 @@
-"""What a cleanup sees of a ROS domain: the actions in sight, what each runs, requests to cancel.
+"""A cleanup's view of a ROS domain: the actions in sight, their running goals, requests to cancel.
 
-Needs no action type, and knows of nobody's goals. Nobody spins the node: what comes in is taken
-from it by hand. Decides nothing (recovery/sweep.py).
+The view needs no action type, and knows of nobody's goals. Nobody spins the node: its messages are
+taken by hand. Decides nothing (recovery/sweep.py).
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from bt_actions.ros.naming import passing_node
 
 NODE = "bt_actions_cleanup"
 STATUS = "/_action/status"
-"""What the name of an action's status topic ends with."""
+"""The end of the name of an action's status topic."""
 DEPTH = 100
-"""Of our ends: with a depth of 1 the status of one server would displace that of another."""
+"""The depth of our ends: with 1, the status of one server would displace that of another."""
 
 
 class ActionView:
-    """One action, as one node sees it from now on; what has come in is taken by hand."""
+    """One action, as one node sees it from now on; arrived messages are taken by hand."""
 
     def __init__(self, node: Node, action: str) -> None:
         self._node = node
@@ -49,18 +49,18 @@ class ActionView:
         )
 
     def servers(self) -> frozenset[bytes]:
-        """Return the GIDs of the servers that are shown."""
+        """Return the GIDs of the servers in sight."""
         return servers(self._node, self._action)
 
     def statuses(self) -> Iterator[Any]:
-        """Take the statuses that have come in."""
+        """Take the statuses that have arrived."""
         handle = self._status.handle
         with handle:
             while (taken := handle.take_message(GoalStatusArray, False)) is not None:
                 yield taken[0]
 
     def answers(self) -> Iterator[tuple[int, int]]:
-        """Take the answers that have come in: the number of the question, and the return code.
+        """Take the answers that have arrived: the number of the question, and the return code.
 
         rclpy's futures hear the first answer alone, where each server gives one.
         """
@@ -71,7 +71,7 @@ class ActionView:
                 yield header.request_id.sequence_number, response.return_code
 
     def cancel(self, goal_id: bytes) -> int | None:
-        """Ask all servers to cancel this goal; return the question's number, None: nobody hears."""
+        """Ask all servers to cancel a goal; return the question's number, None without a server."""
         if not self._client.service_is_ready():
             return None
         request = CancelGoal.Request()
@@ -82,11 +82,11 @@ class ActionView:
 
 
 class CannotStart(RuntimeError):
-    """ROS 2 cannot start: the domain id is none, say."""
+    """ROS 2 that cannot start, for a domain id that is none, say."""
 
 
 class Onlooker:
-    """What one participant has in sight."""
+    """The sight of one participant."""
 
     def __init__(self, node: Node) -> None:
         self.node = node

@@ -24,10 +24,10 @@ from bt_actions.utilities.plain_text import as_json
 
 
 def declare_input(node: Node, name: str, kind: FieldType, value: object, description: str) -> bool:
-    """Show the value of an input as a read-only parameter of the node; of a message, one a field.
+    """Declare the value of an input as a read-only parameter; of a message, one for each field.
 
-    Arrays of messages, and integers beyond int64, are texts, in YAML. False where the node has a
-    parameter of that name already: then nothing is shown.
+    Arrays of messages, and integers beyond int64, are texts, in YAML. Return False where the node
+    has a parameter of that name already: then nothing is declared.
     """
     shown = list(_shown(name, kind, to_plain(value), description))
     if any(node.has_parameter(each.name) for each, _ in shown):
@@ -44,7 +44,7 @@ def typed(name: str, value: object) -> Parameter:
 
 
 def declare(node: Node, parameter: Parameter, descriptor: ParameterDescriptor) -> None:
-    """Show a parameter, read-only, with its type, which an empty list would not tell."""
+    """Declare a read-only parameter with its type, which an empty list would not tell."""
     descriptor.type, descriptor.read_only = parameter.type_.value, True
     node.declare_parameter(parameter.name, parameter.type_, ignore_override=True)
     node.set_parameters([parameter])
@@ -54,7 +54,7 @@ def declare(node: Node, parameter: Parameter, descriptor: ParameterDescriptor) -
 def _shown(
     name: str, kind: FieldType, value: Any, description: str
 ) -> Iterator[tuple[Parameter, ParameterDescriptor]]:
-    """The parameters that an input is."""
+    """Yield the parameters of an input."""
     if isinstance(kind, Message):
         for field, its_kind in describe(kind.cls).items():
             yield from _shown(f"{name}.{field}", its_kind, value[field], description)
@@ -84,4 +84,4 @@ def _shown(
 _MOST = INTEGERS["int64"][1]
 """The greatest integer that a parameter holds."""
 _SINGLE = {**dict.fromkeys(INTEGERS, "INTEGER"), **dict.fromkeys(FLOATS, "DOUBLE"), "bool": "BOOL"}
-"""What the types of fields are as parameters; any other is a text."""
+"""The parameter types of fields' types; a text for any other."""

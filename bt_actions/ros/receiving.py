@@ -1,10 +1,9 @@
-"""The thread that receives what comes for the actions of a node, whoever spins that.
+"""The thread that receives messages for the actions of a node, whoever spins the node.
 
-An executor builds its wait set anew for each spin, with all else of the node in it, and hands what
-came to a thread of its pool. Nothing of a user's is called here, so a wait set with the clients of
-the actions alone will do. All that has arrived is taken, then delivered under one hold of the lock,
-so that a tree is ticked once for all of it. What is delivered, and to whom, is the transports'
-business.
+An executor builds its wait set anew for each spin, with all else of the node in it, and hands each
+message to a thread of its pool. No user's code is called here, so a wait set with the clients of
+the actions alone will do. All messages are taken first, then delivered under one hold of the lock,
+so that a tree is ticked once for all of them. The transports decide what is delivered, and to whom.
 """
 
 from __future__ import annotations
@@ -24,14 +23,14 @@ from bt_actions.ros.log import log
 from bt_actions.utilities.plain_text import raised
 
 AT_MOST = 1_000_000_000
-"""Nanoseconds of a wait: nobody tells that a node was destroyed."""
+"""Nanoseconds of a wait: nothing tells of a destroyed node."""
 
 _receivers: weakref.WeakSet[Receiver] = weakref.WeakSet()
 os.register_at_fork(after_in_child=_receivers.clear)  # their threads are the parent's
 
 
 class Receiver:
-    """Its thread runs as long as there is a transport; no client is destroyed in its wait."""
+    """The thread of a node's transports, while there are any; no client is destroyed in its wait."""
 
     def __init__(self, node: Node) -> None:
         self._node, context = node, node.context
@@ -45,7 +44,7 @@ class Receiver:
         self._thread: threading.Thread | None = None
 
     def join(self, transport: RosTransport) -> None:
-        """Receive for this one, too."""
+        """Receive for this transport, too."""
         with self._let_go:
             self._members += (transport,)
             if self._thread is None or not self._thread.is_alive():
@@ -55,7 +54,7 @@ class Receiver:
         self._wake()
 
     def leave(self, transport: RosTransport) -> None:
-        """Receive no more for this one, which may be destroyed then."""
+        """Stop receiving for this transport, which may be destroyed then."""
         with self._let_go:
             self._members = tuple(each for each in self._members if each is not transport)
             self._wake()
@@ -63,7 +62,7 @@ class Receiver:
                 self._let_go.wait()
 
     def end(self) -> None:
-        """Receive no more, and wait for the end of the thread, if there is one."""
+        """Stop receiving, and wait for the end of the thread, if there is one."""
         with self._let_go:
             self._members, thread = (), self._thread
         if thread is not None and thread.is_alive():
@@ -97,7 +96,7 @@ class Receiver:
             executor.wake()  # rclpy's may miss that a signal has shut its context down
 
     def _take(self, members: tuple[RosTransport, ...]) -> list[RosTransport]:
-        """Wait, take what has arrived, and return for whom."""
+        """Wait, take all messages, and return their transports."""
         context = self._node.context.handle
         with context:
             wait_set = _rclpy.WaitSet(2 * len(members), 1, 0, 3 * len(members), 0, 0, context)
@@ -117,6 +116,6 @@ class Receiver:
 
 @atexit.register
 def _end_all() -> None:
-    """A thread that the interpreter ends in a wait of C++ would abort the process."""
+    """End all threads: one that the interpreter ends in a wait of C++ would abort the process."""
     for each in list(_receivers):
         each.end()

@@ -1,14 +1,14 @@
 """A fresh look at the ROS graph, for servers that our own participant may never be shown again.
 
-A process that was stopped, or cut off, for longer than its lease is dropped by our participant, and
-may have kept ours. If it had announced endpoints shortly before, Fast DDS then waits for ever for
-announcements that are not sent again: the process runs, and stays invisible. A participant that is
+Our participant drops a process that was stopped, or cut off, for longer than its lease, while that
+process may have kept ours. Where it had announced endpoints shortly before, Fast DDS then waits for
+ever for announcements that are not sent again: the process runs, and stays invisible. A participant
 made after the process is back sees it within a second (docs/reliability-settings.md).
 
-So while a server that was in sight is wanted and is not, a new participant looks for it every now
-and then, on a thread of its own. Where a client is ready there, and ours is not, the endpoint goes
-on with that one (`watcher.move_to`); a participant that finds nothing is closed. Nothing is sent
-here, and nothing decided about goals.
+So while a wanted server is out of sight, a new participant looks for it every now and then, on a
+thread of its own. Where a client is ready there, and ours is not, the endpoint goes on with that
+one (`watcher.move_to`); a participant that finds nothing is closed. Nothing is sent here, and
+nothing decided about goals.
 """
 
 from __future__ import annotations
@@ -33,15 +33,17 @@ from bt_actions.traffic.transport import ActionTransport, Listener
 from bt_actions.utilities.plain_text import raised
 
 FIRST_AFTER = 1.5
-"""Seconds until a look after somebody begins to wait; a server that was restarted is seen before.
-Also after a look that found one;"""
+"""Seconds until the first look for a wait, and after a look with a find; a restarted server is seen
+before.
+"""
 LONGEST_PAUSE = 60.0
-"""else each pause is twice the last, up to this."""
+"""The longest pause in seconds: each pause is twice the last."""
 GOES_ON = 1.0
-"""Seconds between two questions whether anything is still missed."""
+"""Seconds between two questions whether any server is still missed."""
 LASTS = 5.0
-"""Seconds that a look lasts; what is there comes in sight in 0.1 to 1.0, or when Fast DDS announces
-the next time, which is after 3 s (both measured)."""
+"""Seconds of a look; a server comes in sight in 0.1 to 1.0, or when Fast DDS announces the next
+time, which is after 3 s (both measured).
+"""
 GLANCE = 0.05
 """Seconds between two questions to the graph in a look."""
 AHEAD = 0.7
@@ -49,15 +51,15 @@ AHEAD = 0.7
 
 _by_domain: dict[tuple[int, str], Rediscovery] = {}
 _bell = threading.Condition(host.lock)
-"""Rings where something is missed, a participant is not used any more, or the process ends."""
+"""Rings for a missed server, an unused participant, and the end of the process."""
 _closing = False  # the process ends
 
 
 class SecondParticipant:
-    """A participant of our own, and who uses it."""
+    """A participant of our own, and its users."""
 
     def __init__(self, domain: int, enclave: str) -> None:
-        """Raises what rclpy raises where it cannot be made."""
+        """Make the participant. Raises what rclpy raises where that fails."""
         self.node = own_node(
             f"bt_actions_rediscovery_{os.getpid()}",
             args=["--ros-args", "--enclave", enclave],
@@ -66,10 +68,10 @@ class SecondParticipant:
         )
         self.made_at = time.monotonic()
         self.users: set[ActionTransport] = set()
-        """Those that somebody goes on with."""
+        """The transports that endpoints go on with."""
 
     def open_transport(self, action_type: Any, name: str, listener: Listener) -> RosTransport:
-        """Become a client of an action here."""
+        """Open a client of an action here."""
         return RosTransport(self.node, action_type, name, listener, self.made_at, self._left_by)
 
     def _left_by(self, transport: ActionTransport) -> None:
@@ -82,10 +84,10 @@ class SecondParticipant:
 
 
 def look_for(endpoint: Endpoint, domain: int, enclave: str) -> None:
-    """Look for the server that it misses, until it misses none; the caller holds the lock.
+    """Look for the servers that an endpoint misses, until none is; the caller holds the lock.
 
-    In the enclave of its node, which may be allowed to look where others are not.
-    Whatever pause between two looks for others has been reached begins anew.
+    The look is in the enclave of the endpoint's node, which may be allowed to look where others are
+    not. The pause between two looks begins anew.
     """
     rediscovery = _by_domain.setdefault((domain, enclave), Rediscovery(domain, enclave))
     rediscovery.add(endpoint)
@@ -94,9 +96,9 @@ def look_for(endpoint: Endpoint, domain: int, enclave: str) -> None:
 class Rediscovery:
     """Looks for the servers that endpoints of one ROS domain, and one enclave, miss.
 
-    On one thread, which waits from then on for the next to be missed: looks on threads of their own
-    would each leave another megabyte behind, because glibc keeps what a thread took for the threads
-    that come later. It also takes participants away: who uses one last holds the lock.
+    One thread makes all looks, and waits for the next missed server: a thread for each look would
+    leave another megabyte behind, because glibc keeps what a thread took for later threads. This
+    thread also takes participants away, whose last user holds the lock.
     """
 
     def __init__(self, domain: int, enclave: str) -> None:
@@ -109,7 +111,7 @@ class Rediscovery:
         self._look_at = math.inf
 
     def add(self, endpoint: Endpoint) -> None:
-        """Look for what this one misses, too."""
+        """Look for the servers that this endpoint misses, too."""
         if endpoint not in self._missing:
             self._missing.append(endpoint)
             _bell.notify_all()
@@ -120,7 +122,7 @@ class Rediscovery:
                 self._thread = thread
 
     def close(self) -> None:
-        """Let no thread be within Fast DDS, and no participant be open, when Python goes."""
+        """End all threads within Fast DDS, and close all participants, before Python goes."""
         if self._thread is not None:
             self._thread.join(LASTS)
         for second in self._participants:
@@ -142,7 +144,7 @@ class Rediscovery:
                 second.close()
 
     def _is_time(self) -> bool:
-        """Wait for something to do; whether that is a look. Sooner when somebody begins to wait."""
+        """Wait for work, less long for a new wait; return whether the work is a look."""
         with host.lock:
             while not (_closing or self._unused()):
                 before, now = self._wanted, time.monotonic()
@@ -165,7 +167,7 @@ class Rediscovery:
         return bool(self._missing)
 
     def _look(self) -> bool:
-        """Look in a new participant; move all there for whom what they miss is ready."""
+        """Look in a new participant; move all endpoints there whose servers are ready."""
         second = SecondParticipant(*self._where)
         self._participants.append(second)
         tried: dict[Endpoint, ActionTransport] = {}

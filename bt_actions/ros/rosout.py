@@ -1,6 +1,6 @@
 """Lines about runs on `/rosout`, in the name of their node; those of served runs are also logged.
 
-rclpy's own loggers would print it all, and hold up the process where nobody reads (log.py).
+rclpy's own loggers would print all lines, and hold up the process without a reader (log.py).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from bt_actions.utilities.plain_text import clean_lines
 
 Level = Literal["info", "warn", "error"]
 Tell = Callable[[Level, str], None]
-"""Says something; an error needs attention."""
+"""Says a line; an error needs attention."""
 
 
 class Rosout:
@@ -31,13 +31,13 @@ class Rosout:
         self._publish, self.close = publisher.publish, publisher.close
 
     def say(self, level: Level, text: str) -> None:
-        """Say something, and never raise; an error needs attention."""
+        """Publish a text, and never raise; an error needs attention."""
         with contextlib.suppress(Exception):  # its node is gone, say: the log has it as well
             stamp, name = self._node.get_clock().now().to_msg(), self._node.get_logger().name
             self._publish(Log(stamp=stamp, level=LEVELS[level], name=name, msg=clean_lines(text)))
 
     def tell(self, level: Level, text: str) -> None:
-        """Say it, and write each line of it to the log with the node's full name."""
+        """Publish a text, and write each line of it to the log with the node's full name."""
         put = {"info": log.info, "warn": log.warning, "error": log.error}[level]
         for line in text.splitlines():
             put(f"{self._name}: {line}")

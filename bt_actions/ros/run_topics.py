@@ -1,8 +1,8 @@
-"""What happens in the runs of a node, and how they stand: its topics ``~/events`` and ``~/tree``.
+"""The events and the states of a node's runs, on its topics ``~/events`` and ``~/tree``.
 
-A thread of its own publishes: no tick waits for a subscriber. A subscriber that comes late, or
-that has lost events, takes the whole state from ``~/tree`` and goes on from its number: each new
-subscription is sent a state that the next event follows. Without subscriptions nothing is encoded.
+A thread of its own publishes: no tick waits for a subscriber. A late subscriber, or one that has
+lost events, takes the whole state from ``~/tree`` and goes on from its number: each new
+subscription gets a state that the next event follows. Without subscriptions nothing is encoded.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from bt_actions.utilities.batches import Batches
 from bt_actions.utilities.plain_text import clean
 
 STATE_WITHIN = 10.0
-"""Seconds after any event within which the state that has it is published."""
+"""Seconds after any event until a state with the event is published."""
 _SOONER: dict[type[Event], float] = {
     RunBegan: 0.0,
     TreeFinished: 0.0,
@@ -47,16 +47,16 @@ _SOONER: dict[type[Event], float] = {
     NodesAdded: 1.0,
     NodesRemoved: 1.0,
 }
-"""The same after some kinds of events."""
+"""The same seconds after some kinds of events."""
 PATIENCE = 2.0
-"""Seconds for the last events to be published when the topics are closed."""
+"""Seconds in which the last events are published at the close of the topics."""
 
 
 class RunTopics:
     """The two topics of a node, for all of its runs.
 
-    With `values`, subscribers are also told goals, results, feedback, variables, inputs and
-    outputs; secrets and the text of tree files never.
+    With `values`, subscribers also get goals, results, feedback, variables, inputs and outputs;
+    secrets and the text of tree files never.
     """
 
     def __init__(self, node: Node, *, values: bool = False) -> None:
@@ -68,16 +68,16 @@ class RunTopics:
         self._runs: list[_Run] = []
         self._listeners = 0
         self._due = math.inf
-        """When a state is to be published, on the steady clock."""
+        """The moment of the next state, on the steady clock."""
         self._batches = Batches("bt_actions-topics", self._step)
         self._batches.start()
 
     def follow(self, stream: Stream) -> None:
-        """Publish what happens from now on in a run, until its RunEnded."""
+        """Publish the events of a run from now on, until its RunEnded."""
         self._runs.append(_Run(stream, self._batches.poke, values=self._values))
 
     def close(self) -> None:
-        """Publish what has come, and be gone, while the node is still there."""
+        """Publish the last events, and close, while the node is still there."""
         self._batches.close(PATIENCE)
         self._events.close()
         self._states.close()
@@ -125,16 +125,16 @@ class _Run:
         self._stream, self._values = stream, values
         self._reader = stream.reader(poke)
         self._waiting: deque[Event] = deque()
-        """What nobody was told of: it came before the run began, and so before its id."""
+        """Events from before the run's begin, and so before its id, that are not published yet."""
         self._id: list[int] = []
         self.state = State()
         self.over = False
         self._latest = Moment(0, 0.0, 0.0, 0.0)
         self._standing = RunState()
-        """How the run stood when somebody last wanted to know."""
+        """The last state that a subscriber wanted."""
 
     def take(self) -> Iterator[Event]:
-        """Yield what has come, once the run's id is known."""
+        """Yield the new events, once the run's id is known."""
         self._waiting += self._reader.take()
         if not self._id:
             began = next((each for each in self._waiting if isinstance(each, RunBegan)), None)
@@ -157,7 +157,7 @@ class _Run:
         return told
 
     def message(self, event: Event, told: Event | None) -> RunEvent:
-        """Return an event as it is published: of one that nobody may know, its kind."""
+        """Return an event as a message: of an event that nobody may know, its kind."""
         status: int = RunEvent.NONE
         if isinstance(event, NodeChanged):
             status = getattr(RunEvent, event.status.name)
@@ -172,7 +172,7 @@ class _Run:
         )
 
     def standing(self) -> RunState:
-        """Return how the run stands, as it is published."""
+        """Return the state of the run as a message."""
         if self._standing.number != self._latest.number:
             self._standing = RunState(
                 run_id=self._id,

@@ -1,8 +1,8 @@
-"""While a runner works on the main thread: signals that would end the process end its trees first.
+"""Signals while a runner works on the main thread: they end its trees before the process.
 
-Only handlers that are Python's own defaults are replaced, and they are put back; so are rclpy's,
-which are set beneath Python's, and of which Python knows nothing. Where the main thread is in C it
-hears nothing, as in any program of Python's.
+Only Python's own default handlers are replaced, and put back at the end; so are rclpy's, which are
+set beneath Python's, and of which Python knows nothing. A main thread in C hears nothing, as in any
+program of Python's.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _BITS: dict[int, int] = {
     signal.SIGINT: int(SignalHandlerOptions.SIGINT),
     signal.SIGTERM: int(SignalHandlerOptions.SIGTERM),
 }
-"""What rclpy calls its handlers for these signals; for both, the sum."""
+"""rclpy's options for handlers of these signals; for both, the sum."""
 
 Interrupt = Callable[[bool, bool], bool | None]
 _watch: _Watch | None = None
@@ -38,16 +38,16 @@ def ended_by_signals(
 ) -> Iterator[None]:
     """Call `interrupt(again, ends_process)` at a signal; its usual effect comes after the block.
 
-    `again` is True from the second signal on: who sends it does not want to wait. `interrupt`
-    returns True where the block does not end by itself. From the second signal on KeyboardInterrupt
-    is raised in it then, and from the third on in any case, unless it returns None: it hurries, and
-    has something to say.
+    `again` is True from the second signal on: its sender does not want to wait. `interrupt` returns
+    True where the block does not end by itself. From the second signal on KeyboardInterrupt is
+    raised in the block then, and from the third on in any case, unless `interrupt` returns None: it
+    hurries, and has something to say.
 
-    The usual effect of SIGINT is KeyboardInterrupt; with rclpy's handlers, which contexts are shut
-    down. The others end the process on the spot, without its exit hooks; then `ends_process` is
-    True, and `last_words` is called before. Of blocks within each other all are told, and the
-    outermost lets the signals take effect. Elsewhere than on the main thread nothing is done,
-    because Python handles signals there only.
+    The usual effect of SIGINT is KeyboardInterrupt; with rclpy's handlers, the shutdown of
+    contexts. The others end the process on the spot, without its exit hooks; then `ends_process` is
+    True, and `last_words` is called before. Of blocks within each other all hear the signal, and
+    the outermost lets it take effect. Outside of the main thread nothing is done, because Python
+    handles signals there only.
     """
     global _watch
     if threading.current_thread() is not threading.main_thread():
@@ -92,7 +92,7 @@ class _Watch:
                 signal.signal(number, self._note)
 
     def take_off(self) -> None:
-        """Put all back: SIGINT's handler last of Python's, as KeyboardInterrupt is back with it."""
+        """Put all handlers back: SIGINT's last of Python's, as it brings KeyboardInterrupt back."""
         meanwhile = _rclpys()  # what an rclpy.init() has put on
         if meanwhile:
             uninstall_signal_handlers()
@@ -121,7 +121,7 @@ class _Watch:
             self._interrupts.pop()
 
     def ends_process(self) -> bool:
-        """Whether what was received ends the process on the spot."""
+        """Return whether a received signal ends the process on the spot."""
         return any(self._is_fatal(number) for number in self._received)
 
     def _is_fatal(self, number: int) -> bool:
@@ -129,7 +129,7 @@ class _Watch:
         return self._before.get(number) is signal.SIG_DFL and not of_rclpy
 
     def let_take_effect(self) -> None:
-        """Raise what was received; KeyboardInterrupt last, after which nothing could be."""
+        """Raise the received signals; KeyboardInterrupt last, after which no other could be."""
         self._is_over = True
         for number in sorted(set(self._received), key=lambda number: number == signal.SIGINT):
             fatal = self._is_fatal(number) and signal.getsignal(number) is signal.SIG_DFL
@@ -138,7 +138,7 @@ class _Watch:
                 os._exit(128 + number)
 
     def disown(self) -> None:
-        """In the child of a fork: it ends as if this had never been."""
+        """Forget all in the child of a fork: a signal ends the child as usual."""
         self.put_back()
         self._received.clear()
         self._rclpys = 0
@@ -158,7 +158,7 @@ class _Watch:
 
 
 def _rclpys() -> int:
-    """For which signals rclpy's handlers are in force, as in `_BITS`."""
+    """Return the signals with rclpy's handlers in force, as in `_BITS`."""
     return int(get_current_signal_handlers_options())
 
 

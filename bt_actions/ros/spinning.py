@@ -1,9 +1,9 @@
 """A node of our own and the thread that spins it, with the one order of shutdown that is clean.
 
 Other orders gave errors about invalid handles, segmentation faults, or leaked a thread pool:
-executor, spin thread, thread pool, clients, node, context. Users who may, and say nothing, share
-one: the first makes it, and it is stopped with the last. Nothing here knows of trees or
-goals beyond closing the node's traffic.
+executor, spin thread, thread pool, clients, node, context. Users may share one spinner: the first
+user makes it, and it stops with the last. Nothing here knows of trees or goals beyond the close of
+the node's traffic.
 """
 
 from __future__ import annotations
@@ -31,12 +31,14 @@ from bt_actions.ros.workarounds import participant
 from bt_actions.ros.workarounds.once_executor import OnceExecutor
 
 THREADS = 2
-"""Of the multi-threaded executor; the interpreter lock does the work, more are no faster."""
+"""Threads of the multi-threaded executor; the interpreter lock does the work, more are no faster.
+"""
 PATIENCE = 1.0
 """Seconds between two questions to an executor of somebody else's."""
 PATIENCE_SPUN = 5.0
-"""Seconds without any sign that somebody else spins our node, where a loop of theirs may call
-spin_once now and then, and a slow callback must be no false alarm."""
+"""Seconds without any sign that somebody else spins our node: a loop of theirs may call spin_once
+now and then, and a slow callback must be no false alarm.
+"""
 
 _number = itertools.count(1)
 _shared: weakref.WeakValueDictionary[object, Spinner] = weakref.WeakValueDictionary()
@@ -49,11 +51,11 @@ class Spinner:
 
     - No node: a context and a node of its own.
     - An executor that holds no node yet, or none: spun here, on a thread of its own.
-    - An executor that holds nodes already is somebody's, who spins it; it is never spun here.
+    - An executor that holds nodes already has an owner, who spins it; it is never spun here.
 
     `executor` may be ``"multi"`` (the default) or ``"single"``. `context`, for a node that is made
-    here, is shut down here as well. `died` is its first user's, and is called on the spin thread
-    when that ends by an error.
+    here, is shut down here as well. `died` is the first user's, and is called on the spin thread at
+    its end by an error.
     """
 
     def __init__(
@@ -68,9 +70,9 @@ class Spinner:
     ) -> None:
         self._users = [died]
         self.error: BaseException | None = None
-        """What the spin thread died of."""
+        """The error that ended the spin thread."""
         self._lock = threading.RLock()
-        """Of starting and stopping: what is called in between may shut down another user."""
+        """Held to start and stop: a call in between may shut down another user."""
         self._thread: threading.Thread | None = None
         self._stopping = False
         self._alive = threading.Event()
@@ -116,10 +118,10 @@ class Spinner:
 
     @classmethod
     def shared(cls, died: Callable[[], None]) -> Spinner:
-        """Return the one of all who share, as long as what ROS goes by is the same.
+        """Return the shared spinner, as long as ROS's settings are the same.
 
-        Another one where it cannot be used any more, and in a callback of its own: who made that
-        may be waiting for it to end.
+        Return another one where the shared one is broken, and in a callback of its own: its maker
+        may be waiting for the callback to end.
         """
         keep_log()  # it may set a variable
         settings = os.getpid(), *sys.argv, *sorted(os.environ.items())
@@ -130,7 +132,7 @@ class Spinner:
             return found
 
     def takes(self, died: Callable[[], None]) -> bool:
-        """Count another user, who gives `died`, unless there is a reason not to."""
+        """Count another user, who gives `died`; return False for a reason not to."""
         usable = self._users and self.error is None and is_valid(self.node) and not self._left()
         if not usable or self.is_called():
             return False
@@ -140,7 +142,7 @@ class Spinner:
     def start(self, give_up: Callable[[], bool] = lambda: False) -> None:
         """Begin to spin; where somebody else should be spinning, make sure that they do.
 
-        Raises RuntimeError when nobody does, for 5 s; not where `give_up` says so before.
+        Raises RuntimeError after 5 s without a spin, unless `give_up` says so before.
         """
         if self.spins:
             with self._lock:
@@ -155,10 +157,11 @@ class Spinner:
             self._check()
 
     def check(self) -> None:
-        """Make sure now and then that whoever spins our node still does.
+        """Make sure now and then that somebody else still spins our node.
 
-        Raises RuntimeError when nobody has for 5 s, as where the executor is in callbacks that do
-        not return, or the node was taken out of it. Out of one that is spun here: sets `error`.
+        Raises RuntimeError after 5 s without a spin, as where the executor is in callbacks that do
+        not return, or the node was taken out of it. A node taken out of our own executor sets
+        `error`.
         """
         if not self.spins:
             self._check()
@@ -166,9 +169,9 @@ class Spinner:
             self._dies(self._gone())
 
     def taken_away(self) -> str:
-        """Say that our node has been put into another executor; empty where it has not, in 0.1 us.
+        """Say that our node has been put into another executor; "" where it has not, in 0.1 us.
 
-        For the thread that ticks, as soon as a behaviour has been in charge.
+        For the ticking thread, after a behaviour has been in charge.
         """
         if not self._moved():
             return ""
@@ -179,21 +182,21 @@ class Spinner:
         )
 
     def is_here(self) -> bool:
-        """Whether our node is not spun while this thread waits, as it is the one that spins it."""
+        """Return whether this thread spins our node, which stands still while this thread waits."""
         return any(_spins(self.executor, frame) for frame in _frames())
 
     def is_called(self) -> bool:
-        """Whether this thread was called by an executor that is spun here."""
+        """Return whether an executor that is spun here called this thread."""
         executor = self.executor
         return self.spins and any(_spins(executor, f) or _calls(executor, f) for f in _frames())
 
     def would_wait_for_itself(self) -> bool:
-        """Whether this thread was called so, and there is one user left, who is to stop it."""
+        """Return whether our executor called this thread, and the one user left is to stop it."""
         return len(self._users) == 1 and self.is_called()
 
     @contextlib.contextmanager
     def replaced(self) -> Iterator[None]:
-        """Have another thread call callbacks while this one, if it was called by ours, waits."""
+        """Let another thread call callbacks while this one, if ours called it, waits."""
         if not isinstance(self.executor, OnceExecutor) or not self.is_called():
             yield
             return
@@ -230,7 +233,7 @@ class Spinner:
         return executor is not self.executor and executor is not None
 
     def _left(self) -> bool:
-        """Whether the node was taken out of its executor; shut down, that holds none."""
+        """Return whether the node was taken out of its executor; after a shutdown, none is in it."""
         return self.node not in self.executor.get_nodes()
 
     def _gone(self) -> RuntimeError:
@@ -241,7 +244,7 @@ class Spinner:
         )
 
     def _spin(self) -> None:
-        """Spin until told to stop; an executor that was given must stay usable, so no shutdown."""
+        """Spin until told to stop; a given executor must stay usable, so it is not shut down."""
         try:
             while not self._stopping:
                 if self._left():
@@ -259,10 +262,10 @@ class Spinner:
             died()
 
     def stop(self, died: Callable[[], None], before_nodes: Callable[[], None] | None) -> None:
-        """Count the user off who gave `died`; with the last one, shut down what is ours.
+        """Count off the user who gave `died`; with the last one, shut down what is ours.
 
-        In the clean order; the user's goals must be drained before. `before_nodes` is called when
-        nothing spins, while nodes and context still live.
+        The order is the clean one; the user's goals must be drained before. `before_nodes` is
+        called when nothing spins, while nodes and context still live.
         """
         with self._lock:
             with _users_lock:
@@ -309,14 +312,14 @@ class Spinner:
 def node_beside(node: Node, name: str) -> Node:
     """Return a new node in the same context and namespace; the caller destroys it.
 
-    What `--ros-args` says is about the other one, whose name it may not get too.
+    `--ros-args` are about the other node, whose name this one must not get.
     """
     namespace = node.get_namespace()
     return Node(name, context=node.context, namespace=namespace, use_global_arguments=False)
 
 
 def _frames() -> Iterator[FrameType]:
-    """Those that this thread is in."""
+    """Yield the frames of this thread."""
     frame: FrameType | None = sys._getframe(1)  # noqa: SLF001 - documented
     while frame is not None:
         yield frame
@@ -324,12 +327,12 @@ def _frames() -> Iterator[FrameType]:
 
 
 def _spins(executor: Executor, frame: FrameType) -> bool:
-    """Whether a frame is one of `spin`, `spin_once` and the like of the executor."""
+    """Return whether a frame is one of `spin`, `spin_once` and the like of the executor."""
     return "spin" in frame.f_code.co_name and frame.f_locals.get("self") is executor
 
 
 def _calls(executor: Executor, frame: FrameType) -> bool:
-    """Whether it is in a frame that the executor calls a callback."""
+    """Return whether the executor calls a callback in this frame."""
     if frame.f_code is not Task.__call__.__code__:
         return False
     return frame.f_locals["self"]._executor() is executor  # noqa: SLF001

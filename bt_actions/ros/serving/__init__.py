@@ -1,1 +1,1 @@
-"""What a server offers on a node, with callbacks for what it decides. Knows nothing of trees."""
+"""The offers of a server on a node, with callbacks for all decisions. Knows nothing of trees."""

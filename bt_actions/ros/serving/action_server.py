@@ -1,8 +1,7 @@
 """rclpy's action server, whose goals are admitted, carried out and ended elsewhere.
 
-No callback here waits. rclpy looks again and again at what it awaits (and a multi-threaded executor
-may forget to), so a goal is never awaited: it is marked as executing, and answered when it has
-ended. Decides nothing.
+No callback here waits. rclpy polls what a callback awaits (and a multi-threaded executor may forget
+to), so no goal is awaited: it is marked as executing, and answered at its end. Decides nothing.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ class DeferredActionServer(ClosableActionServer):
     """An action server that leaves it to others when a goal is executed and when it has ended.
 
     Args:
-        admit: awaited with a goal request; what it returns is handed to `accepted`. None rejects
-            the goal.
-        accepted: called with the goal when its client knows that it was accepted.
+        admit: awaited with a goal request; its return value goes to `accepted`. None rejects the
+            goal.
+        accepted: called with the goal once its client knows of the acceptance.
         dropped: called with the goal's id where the client could not be told of that.
-        cancel: called with a goal when its client has been granted its cancel, and again as long as
+        cancel: called with a goal once its client has been granted the cancel, and again as long as
             that is under way; it may come before `accepted` and `dropped`.
-        yields: whether another server of this name answers: this one then does so for its own
-            goals only, and leaves all else unanswered, as a client takes the first answer.
+        yields: returns whether another server of this name answers: this one then answers for its
+            own goals only, as a client takes the first answer.
         keeps: seconds for which a result can be asked for.
     """
 
@@ -51,8 +50,9 @@ class DeferredActionServer(ClosableActionServer):
         self._admit, self._accepted, self._dropped = admit, accepted, dropped
         self._cancel = cancel
         self._admitted: dict[int, Any] = {}
-        """What `admit` returned, until it is handed over; by the request's id in Python, as rclpy
-        tells of no other."""
+        """The return values of `admit` that wait for `accepted`; by the request's id in Python, as
+        rclpy tells of no other.
+        """
         warn_of_remapping(endpoints.node, name)
         super().__init__(
             endpoints.node,
@@ -66,14 +66,14 @@ class DeferredActionServer(ClosableActionServer):
         )
 
     def begin(self, goal: ServerGoalHandle) -> None:
-        """Mark it as executing, unless it is being canceled."""
+        """Mark a goal as executing, unless it is being canceled."""
         with contextlib.suppress(RCLError):  # a cancel comes at this moment
             goal.execute()
 
     def answer(self, goal: ServerGoalHandle, result: Any, status: int) -> None:
         """End a goal with a status of GoalStatus, and answer its client; on any thread.
 
-        It is aborted where its client has not asked for the cancel that it would end with.
+        A goal that would end as CANCELED without its client's request is aborted.
         """
         if goal.status == GoalStatus.STATUS_ACCEPTED:
             goal.execute()
@@ -91,7 +91,7 @@ class DeferredActionServer(ClosableActionServer):
     # Requests; on the executor's threads
 
     async def execute(self, taken_data: dict[str, Any]) -> None:
-        """Do what rclpy does with what was taken from the middleware, unless another is to."""
+        """Handle taken requests as rclpy does, unless another server is to answer."""
         if taken_data and self._yields():
             taken_data = {
                 what: taken for what, taken in taken_data.items() if self._is_own(what, taken)

@@ -1,9 +1,8 @@
 """The services, publishers and timers of one server on its node; all of them go at once.
 
-Their callbacks run beside each other, on the executor's threads. None may wait: `off` has done
-elsewhere what takes its time. rclpy's executor looks again and again at what is awaited, and a
-multi-threaded one may forget to: it is reminded until it has. Must not spin the node, nor destroy
-it.
+Their callbacks run side by side, on the executor's threads. No callback may wait: `off` gives slow
+work to another thread. rclpy's executor polls what a callback awaits, and a multi-threaded one may
+forget to: it is reminded until it has. Must not spin the node, nor destroy it.
 """
 
 from __future__ import annotations
@@ -23,18 +22,18 @@ from rclpy.task import Future
 from bt_actions.ros.workarounds.closable import closable, closable_service
 
 _NUDGE = 0.01
-"""Seconds between two reminders of an executor that something awaited is there."""
+"""Seconds between two reminders of an executor that an awaited result is there."""
 _SPUN = 10.0
-"""Seconds after which nobody spins it any more."""
+"""Seconds after which the executor counts as dead."""
 
 
 def kept(depth: int) -> QoSProfile:
-    """The quality of service of a topic whose last messages also come to who comes late."""
+    """Return the quality of service of a topic that keeps last messages for late subscribers."""
     return QoSProfile(depth=depth, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Endpoints:
-    """Makes them, and takes them away."""
+    """Makes the endpoints, and takes them away."""
 
     def __init__(self, node: Node) -> None:
         self.node = node
@@ -44,9 +43,9 @@ class Endpoints:
     async def off(
         self, submit: Callable[[Callable[[], None]], Any], work: Callable[[], Any]
     ) -> Any:
-        """Await in a callback what `work` returns or raises; `submit` has another thread do it.
+        """Await in a callback the result of `work`, or its error; `submit` starts another thread.
 
-        That thread is done with it when the callback has what it awaits.
+        That thread is done with the work when the callback has the result.
         """
         executor: Any = self.node.executor
         future, taken = Future(executor=executor), threading.Event()
@@ -79,7 +78,8 @@ class Endpoints:
     ) -> None:
         """Offer a service; the callback may be a coroutine.
 
-        While it is `silent`, nobody is answered: of two answers a client takes the first.
+        While the server is `silent`, no client is answered: of two answers a client takes the
+        first.
         """
         made = self.node.create_service(kind, name, callback, callback_group=self.group)
         service = closable_service(made, silent)
@@ -106,5 +106,5 @@ class Endpoints:
         return timer
 
     def close(self) -> None:
-        """Destroy them all, the latest first."""
+        """Destroy all endpoints, the latest first."""
         self._made.close()

@@ -1,4 +1,4 @@
-"""The standard interface of a managed node, on a plain one. What a change does is its user's.
+"""The standard interface of a managed node, on a plain one. The user gives the work of a change.
 
 The states are rcl's own table. rclpy's LifecycleNode will not do: an illegal request kills its
 executor, and nothing is answered during a change.
@@ -23,8 +23,8 @@ from bt_actions.utilities.plain_text import in_words
 class Lifecycle:
     """The state of a node, and the services that tell and change it; unconfigured at first.
 
-    `steps` has what is done in a state of transition ("configuring", ...): what raises fails, and
-    the state is as before. One change at a time.
+    `steps` has the work in a state of transition ("configuring", ...): an error fails the change,
+    and the state is as before. One change at a time.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Lifecycle:
         return str(self._machine.current_state[1])
 
     def change(self, transition: str | int) -> bool:
-        """Make a transition by its label or id; whether it succeeded. Returns when it is done."""
+        """Make a transition by its label or id; return, when it is done, whether it succeeded."""
         if not self._changes.acquire(blocking=False):
             return False
         try:
@@ -73,15 +73,15 @@ class Lifecycle:
         return how == "success"
 
     def stop(self) -> None:
-        """Return when a change that is under way is over; none follows."""
+        """Return once a running change is over; none follows."""
         self._changes.acquire()
 
     def close(self) -> None:
-        """Be gone, after `stop`, and after its endpoints."""
+        """Close, after `stop`, and after the endpoints."""
         self._machine.destroy_when_not_in_use()
 
     def _trigger(self, wanted: str | int) -> None:
-        """Go to the next state, and tell of it; KeyError: there is no such way from here."""
+        """Go to the next state, and tell of it. Raises KeyError where no way leads there."""
         possible = {key: each for each in self._machine.available_transitions for key in each[:2]}
         self._machine.trigger_transition_by_id(possible[wanted][0], False)
         now = self._node.get_clock().now().nanoseconds
@@ -115,7 +115,7 @@ def _state(number: int, label: str) -> State:
 
 
 def _described(number: int, label: str, *ends: Any) -> dict[str, Any]:
-    """What messages tell of a transition; `ends` are the ids and labels of its two states."""
+    """Return a transition for messages; `ends` are the ids and labels of its two states."""
     return {
         "transition": Transition(id=number, label=label),
         "start_state": _state(*ends[:2]),

@@ -1,8 +1,8 @@
-"""Which of several servers of one action answers: the one that has been there longest.
+"""The choice among several servers of one action: the oldest answers.
 
-A server offers a topic on which nothing is published. Its name says since when the server is there
-and whose process it is, and the graph shows it as long as the process counts as alive. So all
-servers of the action see one order, and nobody asks or waits for the others.
+A server offers a topic on which nothing is published. The topic's name says since when the server
+is there and whose process it is, and the graph shows the topic as long as the process counts as
+alive. So all servers of the action see one order, and none asks or waits for the others.
 """
 
 from __future__ import annotations
@@ -21,18 +21,20 @@ from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.utilities.ids import author_of, new_id
 
 LOOK = 1.0
-"""Seconds in which a new server is shown one that is there (0.04 to 0.6 measured)."""
+"""Seconds in which a new server is shown an older one (0.04 to 0.6 measured)."""
 _GLANCE = 0.05
 """Seconds between two looks."""
 _UNCLAIMED = 2.0
-"""Seconds for which a server is in sight until its topic is, too, if it has one;"""
+"""Seconds from the sight of a server to that of its topic, if it has one."""
 _UNCLAIMED_AT_START = 0.3
-"""and before this one has answered anybody, when to yield for a moment costs nothing."""
+"""The same seconds before this server has answered anybody: to yield for a moment costs nothing
+then.
+"""
 _CLAIM = re.compile(r"/_since/t\d{20}_[0-9a-f]{32}$")
 
 
 class Precedence:
-    """Looks once a second whether others come before one server of an action, and says so."""
+    """Looks once a second for servers with precedence over one server of an action, and says so."""
 
     def __init__(self, endpoints: Endpoints, action: str, say: Tell) -> None:
         self._node, self._say = endpoints.node, say
@@ -40,7 +42,7 @@ class Precedence:
         self.why = ""
         """Why another server is to answer; "" most often."""
         self.regained: Callable[[], None] = lambda: None
-        """Called when another server had to answer, and this one is to answer now."""
+        """Called when precedence comes back from another server to this one."""
         self._action = self._node.resolve_topic_name(action, only_expand=True)
         self._mine = f"/_since/t{time.time_ns():020d}_{new_id().hex()}"
         endpoints.publisher(Time, f"{self._action}{self._mine}", 1)
@@ -49,12 +51,12 @@ class Precedence:
         endpoints.timer(LOOK, self.yields)
 
     def look_first(self) -> None:
-        """Look until whoever is there has been discovered, most likely. May take a second."""
+        """Look until older servers are most likely discovered. May take a second."""
         while not self.yields() and time.monotonic() < self._begun + LOOK:
             time.sleep(_GLANCE)
 
     def yields(self) -> bool:
-        """Whether another server is to answer, as seen now; on any thread."""
+        """Return whether another server is to answer, as seen now; on any thread."""
         with self._lock:
             before, self.why = self.why, self._look()
             why = self.why
@@ -66,7 +68,7 @@ class Precedence:
         return bool(why)
 
     def is_doubled(self) -> bool:
-        """Whether a server that comes first has a node of the same name, and so our services."""
+        """Return whether a server with precedence has a node of our name, and so our services."""
         if not self.yields():
             return False
         mine = self._node.get_name(), self._node.get_namespace()
@@ -75,7 +77,7 @@ class Precedence:
     def _look(self) -> str:
         """Return why another server is to answer, or "".
 
-        One that was killed on this machine does not count; on another machine, it does until
+        A server that was killed on this machine does not count; on another machine, it counts until
         discovery drops it.
         """
         try:
@@ -103,7 +105,7 @@ class Precedence:
 
 
 def _claimant(claimed_by: bytes) -> str:
-    """Whose id it is, in words; "" for a process that is dead."""
+    """Return the owner of an id in words; "" for a dead process."""
     author = author_of(claimed_by)
     if author is None or not author.here:
         return "a process on another machine"

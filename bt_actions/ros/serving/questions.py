@@ -1,4 +1,4 @@
-"""What servers in sight say, asked by a participant that is gone afterwards. All of it blocks."""
+"""Questions to servers in sight, asked by a participant that is gone afterwards. All calls block."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ GLANCE = 0.05
 
 
 class _Question:
-    """A request that is sent again each second until it is answered.
+    """A request that is sent again each second until an answer comes.
 
     Of several servers of a service, the one that answers may be discovered last.
     """
@@ -36,7 +36,7 @@ class _Question:
         self._next = 0.0
 
     def answer(self) -> Any:
-        """Return the answer; None as long as there is none. Sends the request where it is time."""
+        """Return the answer, or None without one yet; send the request again where it is time."""
         for future in self._sent:
             if future.done():
                 return future.result()
@@ -53,7 +53,7 @@ class Asker:
         self._node = node
 
     def heard(self, message_type: type, depth: int) -> Iterator[Any]:
-        """Yield what is kept on every topic of a type, for some seconds; see `kept`."""
+        """Yield the kept messages of every topic of a type, for some seconds; see `kept`."""
         came: list[Any] = []
         known: set[str] = set()
         for _ in self._looks(PATIENCE):
@@ -73,13 +73,13 @@ class Asker:
         return ""
 
     def ask(self, service_type: Any, name: str, request: Any) -> Any:
-        """Return what a service answers; None where it does not."""
+        """Return the answer of a service; None without one."""
         question = _Question(self._node, service_type, name, request)
         answers = (question.answer() for _ in self._looks(PATIENCE))
         return next((each for each in answers if each is not None), None)
 
     def answers(self, service_type: Any, namespace: str) -> dict[str, Any]:
-        """Ask every service of a type below a namespace; by its name, None: it does not answer."""
+        """Ask every service of a type below a namespace; return answers by name, None for silence."""
         below = f"/{namespace.strip('/')}/".replace("//", "/")
         asked: dict[str, _Question] = {}
         for passed in self._looks(PATIENCE + DISCOVERS):
@@ -94,7 +94,7 @@ class Asker:
         return {name: asked[name].answer() for name in sorted(asked)}
 
     def _looks(self, seconds: float) -> Iterator[float]:
-        """Yield the time that has passed, again and again; take in what comes in between."""
+        """Yield the passed time again and again; take in messages in between."""
         begun = time.monotonic()
         while (passed := time.monotonic() - begun) < seconds:
             yield passed
@@ -103,7 +103,7 @@ class Asker:
 
 @contextlib.contextmanager
 def asking() -> Iterator[Asker]:
-    """Ask with a participant that is gone afterwards."""
+    """Yield an asker with a participant of its own, and take both away afterwards."""
     with passing_node("bt_actions_asks") as node:
         executor = SingleThreadedExecutor(context=node.context)
         executor.add_node(node)

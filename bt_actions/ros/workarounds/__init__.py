@@ -1,4 +1,4 @@
-"""What goes around a bug of rclpy, rmw_fastrtps or Fast DDS.
+"""Ways around bugs of rclpy, rmw_fastrtps and Fast DDS.
 
-Each file names the bug and how to see that it is needed no more. Must not hold anything else.
+Each file names its bug and the sign that the file is needed no more. Nothing else belongs here.
 """

@@ -1,13 +1,12 @@
 """rclpy's ActionServer, which may be destroyed while its node is spun.
 
 rclpy's executor asks a server for its entities, and takes and answers requests, while another
-thread may destroy it: its spin then ends with InvalidHandle, as it does with whatever else is
-raised while a request is answered. rclpy #1150 mended that for messages, and not for actions. Not
-needed any more where tests/ros/test_closable.py sees no InvalidHandle of a plain one.
+thread may destroy the server: the spin then ends with InvalidHandle, as with any other error while
+a request is answered. rclpy #1150 mended that for messages, and not for actions. Not needed any
+more where tests/ros/test_closable.py sees no InvalidHandle of a plain one.
 
-rclpy would also look again and again at a goal that is awaited, and have the executor send its
-result. Here whoever executes a goal does so elsewhere, and the result is sent by whoever sets it,
-or asks for it.
+rclpy would also poll an awaited goal, and have the executor send its result. Here a goal is
+executed elsewhere, and the thread that sets or asks for a result sends it.
 """
 
 from __future__ import annotations
@@ -66,12 +65,12 @@ class ClosableActionServer(ActionServer):  # type: ignore[misc]
             return otherwise
 
     async def execute(self, taken_data: dict[str, Any]) -> None:
-        """Answer what was taken, each request on its own."""
+        """Answer the taken requests, each on its own."""
         for kind, taken in taken_data.items():
             await self.guarded(super().execute, {kind: taken})
 
     async def guarded(self, work: Callable[..., Awaitable[object]], *arguments: Any) -> None:
-        """Await what would end the executor's spin where it raises."""
+        """Await work whose error would end the executor's spin."""
         try:
             await work(*arguments)
         except Exception as error:  # noqa: BLE001 - see above

@@ -1,7 +1,7 @@
 """Publishers, subscriptions and services that may be destroyed while their node is spun.
 
 rclpy's executor may have the event handlers of one in hand, or be about to send an answer, while
-another thread destroys it, and its spin then ends with InvalidHandle: the whole process stops
+another thread destroys it. The spin then ends with InvalidHandle: the whole process stops
 listening. rclpy #1150 mended that where messages are taken, and nowhere else. Not needed any more
 where tests/ros/test_closable.py sees no InvalidHandle of a plain one. Knows of no topic.
 """

@@ -3,8 +3,8 @@
 rclpy's hands a piece of work that waits for a thread of the pool to the pool again, in a loop that
 holds the interpreter's lock, until a thread has begun with it; the pool's threads need that lock.
 Measured, with /clock at 100 Hz: 7,000 hand-overs a second, 2,000 of them queued at a time, and all
-Python threads of the process still for 0.2 s again and again. Here whoever spins waits for the pool
-instead. What is called, in which order and on how many threads is as it was: rclpy's looks at
+Python threads of the process still for 0.2 s again and again. Here the spinning thread waits for
+the pool instead. The calls, their order and the number of threads are as before: rclpy's looks at
 nothing new either while work waits for a thread. The bug is rclpy #1452, mended by rclpy #1547: not
 needed any more with a release that has that.
 """
@@ -18,7 +18,7 @@ from typing import Any
 from rclpy.executors import MultiThreadedExecutor, TimeoutException
 
 AT_MOST = 0.01
-"""Seconds for which a spin waits for the pool, and does not notice that it is to end."""
+"""Seconds in which a spin waits for the pool, deaf to a request to end."""
 
 
 class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
@@ -32,7 +32,7 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
         self._executor = self.pool = _Pool(num_threads)
 
     def wait_for_ready_callbacks(self, *args: Any, **options: Any) -> Any:
-        """Return what is to be run next, as rclpy's does; TimeoutException: nothing, as yet."""
+        """Return the next work, as rclpy's does. Raises TimeoutException for none yet."""
         ready = super().wait_for_ready_callbacks(*args, **options)
         if self.pool.holds(ready[0]):
             raise TimeoutException
@@ -40,7 +40,7 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
 
 
 class _Pool(ThreadPoolExecutor):
-    """Knows which work it was given and has not begun."""
+    """A pool that knows the work it has not begun."""
 
     def __init__(self, num_threads: int) -> None:
         super().__init__(num_threads)
@@ -57,11 +57,11 @@ class _Pool(ThreadPoolExecutor):
         return task(*args, **options)
 
     def add_threads(self, number: int) -> None:
-        """Have so many threads more, at most; those that are there stay."""
+        """Add so many threads, at most; those that are there stay."""
         self._max_workers += number
 
     def holds(self, task: Any) -> bool:
-        """Whether `task` waits for a thread; waits a moment for one that begins with any."""
+        """Return whether `task` waits for a thread; wait a moment for a thread that begins one."""
         self._begun.clear()
         if task not in self._held:
             return False

@@ -1,11 +1,11 @@
-"""Takes a context of our own away, with the last of its nodes, so that Fast DDS does not hang.
+"""The end of a context of our own, with the last of its nodes, so that Fast DDS does not hang.
 
-rmw_fastrtps takes its listener off a participant before it destroys it, and Fast DDS waits without
-a limit for what the listener is just being told. Where condition variables know no steady clock, as
-in the wheels, that wait is a loop which holds the lock that the listener needs: it never ends, and
-rclpy holds Python's lock meanwhile (the mechanism: Fast DDS #6513; measured: once in 4,000
-participants that were closed while they discovered 80 robots). The same call with a limit waits in
-good order, so it is made here before. Not needed any more where libfastrtps imports
+rmw_fastrtps takes its listener off a participant before it destroys the participant, and Fast DDS
+waits without a limit for the listener's present call. Where condition variables know no steady
+clock, as in the wheels, that wait is a loop which holds the lock that the listener needs: the wait
+never ends, and rclpy holds Python's lock meanwhile (the mechanism: Fast DDS #6513; measured: once
+in 4,000 participants that were closed while they discovered 80 robots). The same call with a limit
+waits in good order, so it is made here before. Not needed any more where libfastrtps imports
 pthread_cond_clockwait.
 """
 
@@ -20,7 +20,7 @@ from typing import Any
 from rclpy.node import Node
 
 LIMIT = 5
-"""Seconds for what the listener is just being told, which takes well under a millisecond."""
+"""Seconds for the listener's present call, which takes well under a millisecond."""
 _PARTICIPANT_OF = "_ZN16rmw_fastrtps_cpp22get_domain_participantEP10rmw_node_s"
 """rmw_fastrtps_cpp::get_domain_participant(rmw_node_t *)"""
 _SET_LISTENER = (
@@ -42,7 +42,7 @@ def close(node: Node) -> None:
 
 
 def fall_silent(node: Node) -> bool:
-    """Have the participant of a node take note of no discovery any more; say whether it could."""
+    """Stop the discovery of a node's participant; return whether that was possible."""
     try:
         rmw_node_of, participant_of, set_listener = _functions()
         with node.handle:
@@ -54,7 +54,7 @@ def fall_silent(node: Node) -> bool:
 
 @functools.cache
 def _functions() -> tuple[Any, Any, Any]:
-    """Return what leads from an rcl_node_t to its participant, and takes the listener off that."""
+    """Return functions from an rcl_node_t to its participant, and to take the listener off that."""
     loaded = os.RTLD_NOLOAD | os.RTLD_LAZY
     rmw_node_of = ctypes.CDLL("librcl.so", mode=loaded).rcl_node_get_rmw_handle
     rmw = ctypes.CDLL("librmw_fastrtps_cpp.so", mode=loaded)

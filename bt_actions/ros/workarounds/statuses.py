@@ -1,11 +1,11 @@
-"""Takes GoalStatusArray without a Python object for each goal in it.
+"""The take of a GoalStatusArray without a Python object for each goal in it.
 
-A server publishes the status of every goal that it still knows, by default for 15 minutes, each
-time that one changes. rclpy makes two objects and an array of numpy for each: 1.4 ms for 150 goals,
-where this takes 0.02 ms. It reads the C message as rosidl lays it out; that is tried at the first
-use, and where it comes out different, rclpy's own way is taken. Can go when rosidl_generator_py
-converts in less than a microsecond an entry (tests/ros/test_statuses.py measures nothing, but shows
-that both ways read the same). Decides nothing.
+A server publishes the status of every goal that it still knows, by default for 15 minutes, at each
+change of one. rclpy makes two objects and an array of numpy for each: 1.4 ms for 150 goals, where
+this takes 0.02 ms. The C message is read in rosidl's layout; the first use tries that, and where
+the result is wrong, rclpy's own way is taken. Can go when rosidl_generator_py converts in less than
+a microsecond an entry (tests/ros/test_statuses.py measures nothing, but shows that both ways read
+the same). Decides nothing.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from action_msgs.msg import GoalStatus, GoalStatusArray
 from rclpy.serialization import deserialize_message, serialize_message
 
 ID, ENTRY, STATUS = 16, 28, 24
-"""Bytes of a goal's id, and of an entry (id, time, status, filled up); and where the status is."""
+"""Bytes of a goal's id, and of an entry (id, time, status, filled up); and the place of the status.
+"""
 
 
 class _Sequence(ctypes.Structure):
@@ -35,20 +36,20 @@ def _read(message: int) -> dict[bytes, int]:
 
 
 _CONVERT = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)(_read)
-"""The same as a C function; it has to be there as long as anybody may call it."""
+"""The same as a C function, which has to live as long as anybody may call it."""
 
 
 def by_objects(message: Any) -> dict[bytes, int]:
-    """Read it as rclpy makes it."""
+    """Read a message as rclpy makes it."""
     return {bytes(entry.goal_info.goal_id.uuid): entry.status for entry in message.status_list}
 
 
 @functools.cache
 def status_reader() -> tuple[type, Callable[[Any], dict[bytes, int]]]:
-    """Return what to give a `take_status`, and what makes {goal id: status} of what that returns.
+    """Return an argument for `take_status`, and a function from its result to {goal id: status}.
 
-    In place of the message type stands one that is read at once, if a message of two goals that
-    rclpy has laid out is read as what it is.
+    The argument stands for the message type: one that is read at once, where a message of two goals
+    in rclpy's layout is read right.
     """
     message = GoalStatusArray(status_list=[GoalStatus(status=2), GoalStatus(status=6)])
     for number, entry in enumerate(message.status_list, 1):
