@@ -1,4 +1,4 @@
-"""Files of XML to files of YAML, with a report: `convert` is all that a caller needs."""
+"""Files of XML to files of YAML, with a report: `convert` is the one entry."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from bt_actions.importing.writer import Writer
 
 @dataclass
 class Imported:
-    """What came of an import."""
+    """The result of an import."""
 
     files: dict[str, str] = field(default_factory=dict)
     """The text of each file, by its name."""

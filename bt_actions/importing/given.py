@@ -1,4 +1,4 @@
-"""A node of the XML as the functions of kinds see it: each attribute is accounted for."""
+"""A node of the XML for the functions of kinds: each attribute is accounted for."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bt_actions.importing.text import Node
 
 
 class Writing(Protocol):
-    """What writes the tree that the node is in."""
+    """The writer of the tree that the node is in."""
 
     project: Project
     report: Report
@@ -93,11 +93,11 @@ class Given:
 
     @property
     def around(self) -> str:
-        """The kind of the node around it, or ""."""
+        """The kind of the parent, or ""."""
         return next((kind for kind in self.writer.above[-2::-1] if kind not in SUBTREES), "")
 
     def named(self, node: Node) -> Node:
-        """Give a node, whose kind says enough, the name that the XML has."""
+        """Give a node that needs no name the name in the XML."""
         if "name" in self.element.attributes:
             node["name"] = self.name()
         return node
@@ -115,7 +115,7 @@ class Given:
         return [self.writer.node(child, self.scope) for child in self.element.children]
 
     def rest(self) -> None:
-        """Drop what nobody took."""
+        """Drop the attributes that nobody took."""
         for name in sorted(self._left):
             self.dropped(name, f"{self.kind} has nothing of that name here")
 

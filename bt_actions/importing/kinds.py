@@ -1,4 +1,4 @@
-"""What becomes of each kind of node of BehaviorTree.CPP: `KINDS` has a function for each."""
+"""BehaviorTree.CPP's kinds of nodes in our language: `KINDS` has a function for each."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SAME = "BlackboardCheck"
 
 
 def _composite(kind: str, neutral: str, **more: object) -> Handler:
-    """`neutral` is the status of a dropped child that changes nothing."""
+    """Return a composite's handler; `neutral` is the status of a dropped child without effect."""
 
     def write(given: Given) -> Node:
         children = given.children()
@@ -129,7 +129,7 @@ def _timeout(given: Given) -> Node:
 
 
 def _asked_by(condition: Node) -> object:
-    """A child that is a condition, as the value of `if`."""
+    """Return a child that is a condition, as the value of `if`."""
     return condition["check"] if set(condition) <= {"check", "name"} else condition
 
 
@@ -206,7 +206,7 @@ def _precondition(given: Given) -> Node:
 
 
 def _same(given: Given) -> Node:
-    """A check of two values of BehaviorTree.CPP 3."""
+    """Write a check of two values of BehaviorTree.CPP 3."""
     sides = []
     for name in ("value_A", "value_B"):
         text = given.reference(name)

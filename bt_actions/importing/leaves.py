@@ -1,4 +1,4 @@
-"""Leaves of one's own, by a map; classes that are to be written stand for the others."""
+"""Leaves of one's own, by a map; stubs stand for the others."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from bt_actions.importing.stubs import stub_node
 from bt_actions.importing.text import Node
 
 _MISSING = object()
-"""The value of a port that the XML does not give."""
+"""The value of a port without one in the XML."""
 
 
 def leaf(given: Given) -> Node:
@@ -55,7 +55,7 @@ class _Filled:
         return node
 
     def _declare(self, kind: str, node: Node) -> None:
-        """Have the tree declare the words that the node uses."""
+        """Let the tree declare the words that the node uses."""
         writer, mapping = self._given.writer, self._given.writer.project.mapping
         for word in {kind, *re.findall(r"\$(\w+)", repr(self._leaf.node))} - set(self._leaf.ports):
             if word in mapping.imports:
@@ -69,7 +69,7 @@ class _Filled:
         node["type"], node["server"] = mapping.imports[kind][1], ros_name(server)
 
     def _port(self, port: str) -> object:
-        """The value of a port, `$name` for a variable, or _MISSING."""
+        """Return the value of a port, `$name` for a variable, or _MISSING."""
         declared = self._leaf.ports.get(port, {})
         attributes = self._given.element.attributes
         if port not in attributes:

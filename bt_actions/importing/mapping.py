@@ -38,15 +38,15 @@ class MapError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Leaf:
-    """A node of ours in which `$port` stands for what the XML gives."""
+    """A node of ours in which `$port` stands for a value in the XML."""
 
     node: Mapping[str, Any]
     ports: Mapping[str, Mapping[str, Any]]
-    """By name: type and default, as far as they are known."""
+    """Type and default of each port by its name, as far as they are known."""
 
     @property
     def outputs(self) -> frozenset[str]:
-        """The ports that it writes."""
+        """The ports that the leaf writes."""
         return frozenset(port for key in SAVES for port in self.node.get(key) or ())
 
     def type_of(self, port: str) -> str:
@@ -56,13 +56,13 @@ class Leaf:
 
 @dataclass(slots=True)
 class Map:
-    """Leaves by their IDs, and the words that they are written with."""
+    """Leaves by their IDs, and the declarations of their words."""
 
     leaves: dict[str, Leaf] = field(default_factory=dict)
     words: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """What `actions`, `topics` and `kinds` declare."""
+    """The declarations under `actions`, `topics` and `kinds`."""
     imports: dict[str, tuple[str, str]] = field(default_factory=dict)
-    """By the name of an action or a topic: the file that declares it, and its type."""
+    """The file that declares an action or a topic, and its type, by name."""
     constants: dict[str, int] = field(default_factory=dict)
 
     def section_of(self, name: str) -> str | None:
@@ -82,7 +82,7 @@ def nav2() -> Map:
 
 
 def read_map(path: Path) -> Map:
-    """Read a map; what it does not have is Nav2's. Raises MapError."""
+    """Read a map; Nav2's fills the rest. Raises MapError."""
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:

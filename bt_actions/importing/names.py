@@ -21,11 +21,11 @@ NOTHING = {
     "float32": 0.0,
     **dict.fromkeys(("int64", "int32", "uint16", "uint8"), 0),
 }
-"""By type: what a variable holds that nothing wrote; a message its defaults."""
+"""The value of a variable that nothing wrote, by type; a message has its defaults."""
 
 
 def identifier(text: str) -> str:
-    """Return a name of ours that is as near to a text as can be."""
+    """Return the name of ours that is nearest to a text."""
     word = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")
     return word if re.match("[A-Za-z]", word) else f"x{word}"
 
@@ -36,7 +36,7 @@ def input_name(name: str, *, taken: bool) -> str:
 
 
 def milliseconds(number: int) -> str:
-    """Return a duration."""
+    """Return milliseconds as a duration."""
     return f"{number // 1000} s" if number % 1000 == 0 and number else f"{number} ms"
 
 
@@ -47,7 +47,7 @@ def node_name(text: str) -> str:
 
 
 def ros_name(value: object) -> str:
-    """Return what is a name of ROS, or a variable that holds one. Raises Refused."""
+    """Return a name of ROS, or a variable that holds one. Raises Refused."""
     if isinstance(value, str) and re.fullmatch(r"\$[A-Za-z]\w*", value, re.ASCII):
         return f"$({value[1:]})"
     if not isinstance(value, str) or not re.fullmatch(_ROS_NAME, value, re.ASCII):
@@ -61,7 +61,7 @@ def in_sequence(name: str, nodes: list[Node], kind: str = "sequence") -> Node:
 
 
 def value_of(text: str, kind: str) -> object:
-    """Return what a text of the XML is, of a type. Raises Refused."""
+    """Return a text of the XML as a value of a type. Raises Refused."""
     if text.startswith("json:"):
         try:
             return json.loads(text.removeprefix("json:"))
@@ -84,7 +84,7 @@ def value_of(text: str, kind: str) -> object:
 
 
 class Scope:
-    """The names of a tree of the XML, and what stands for each behind a dollar sign here."""
+    """The names of a tree of the XML, and the words behind a dollar sign for each here."""
 
     def __init__(
         self,
@@ -95,7 +95,7 @@ class Scope:
         self.definition = definition
         self._prefix, self._outer = prefix, outer
         self.literals: dict[str, object] = {}
-        """Ports that were given a value, of a tree that is written into its caller."""
+        """Ports with a constant value, of a tree that is written into its caller."""
         self.topics: dict[str, str] = {}
 
     def __getitem__(self, name: str) -> str:

@@ -1,4 +1,4 @@
-"""What becomes of Nav2's control nodes, and of leaves that are no action and no service there."""
+"""Nav2's control nodes in our language, and its leaves that are no action and no service there."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""The trees of some files, and which of their variables each reads and writes.
+"""The trees of some files, and the variables that each reads and writes.
 
 Names of variables are those of the XML here. A subtree's ports are other names of its caller's
-variables, so what is done to a port is done to what the caller gives.
+variables: a write to a port is a write to the caller's variable.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _VARIABLE = re.compile(r"\s*\$?\{\s*([^{}]*?)\s*\}\s*")
 
 
 def kind_of(element: Element) -> str:
-    """Return the ID of a node, however it is written."""
+    """Return the ID of a node, in either notation."""
     return element.attributes.get("ID", element.tag) if element.tag in _CALLED else element.tag
 
 
@@ -73,16 +73,16 @@ class Definition:
     name: str
     element: Element
     version: int
-    """3 or 4: of the format."""
+    """The format: 3 or 4."""
     accesses: dict[str, str] = field(default_factory=dict)
-    """By variable: `r`, `w`, `rw` or `wr`, what is done first standing first."""
+    """The accesses of each variable: `r`, `w`, `rw` or `wr`, the first one first."""
     done: bool = False
     outputs: set[str] | None = None
-    """What callers get, when it was asked for."""
+    """The outputs for callers, once asked for."""
 
     @property
     def root(self) -> Element | None:
-        """The one node below it, or None."""
+        """The one node of the tree, or None."""
         return self.element.children[0] if len(self.element.children) == 1 else None
 
     def reads_first(self, name: str) -> bool:
@@ -101,17 +101,17 @@ class Project:
         self.mapping, self.report = mapping, report
         self.trees: dict[str, Definition] = {}
         self.models: dict[str, dict[str, str]] = {}
-        """By ID: the directions of the ports."""
+        """The directions of the ports, by ID."""
         self.model_types: dict[str, dict[str, str]] = {}
-        """By ID: the types of the ports, as far as they are known here."""
+        """The types of the ports that are known here, by ID."""
         self.stubs: dict[str, Any] = {}
-        """By ID: the kinds that are to be written; `stubs.py` fills it."""
+        """The stubs by ID; `stubs.py` fills the table."""
         self.failed: list[XmlError] = []
         self.sorts = Sorts()
         self.types: dict[str, str] = {}
-        """By variable: the type of a port that it is given to."""
+        """The type of a port that a variable is given to, by variable."""
         self._alike: dict[str, set[str]] = {}
-        """By variable: those that it is given to, or gets its value from."""
+        """The variables that share a value with each variable."""
         self._given = {path.resolve().parent for path in paths}
         self._read: set[Path] = set()
         for path in paths:
@@ -298,7 +298,7 @@ class Project:
         return known or "string"
 
     def knows(self, name: str) -> bool:
-        """Return whether anything tells the type of a variable."""
+        """Return whether the type of a variable is known."""
         return name in self.types or self.sorts[name] is not Sort.ANY
 
     @staticmethod
@@ -418,7 +418,7 @@ COMPARED = {
 _WITHOUT_PORTS = ("GoalUpdated", "GlobalUpdatedGoal", "GoalUpdatedController")
 """Kinds whose ports have no meaning here."""
 WRITTEN_BY_KIND = {"GoalUpdater": "output_goal", **SELECTORS}
-"""Kinds that are not in a map, and the port that they write."""
+"""Kinds without a row in a map, and the port that they write."""
 
 
 def outer_name(element: Element, inner: Definition, name: str) -> str | None:

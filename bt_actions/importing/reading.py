@@ -1,7 +1,7 @@
-"""XML read as tinyxml2 reads it for BehaviorTree.CPP, from strangers: no entities, bounded.
+"""XML from strangers, read as tinyxml2 reads it for BehaviorTree.CPP: no entities, bounded.
 
-BehaviorTree.CPP takes `<` and `&` as they stand in an attribute, which no parser of XML does. So
-one pass escapes them first, and keeps in mind where, so that each place is that of the file.
+BehaviorTree.CPP takes a bare `<` or `&` in an attribute, and no parser of XML does. So one pass
+escapes them first, and notes where: each reported place is the file's.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from bt_actions.document.findings import DocumentError
 from bt_actions.document.yaml.source import read_source
 
 MOST_CHARACTERS = 4_000_000
-"""Of one file: a thousand times what a large one has."""
+"""Characters of one file: a thousand times as many as a large one has."""
 DEEPEST = 60
 """Elements inside of each other: as many levels as a tree of ours may have."""
 _OPENS = re.compile(r"<!--.*?(?:-->|\Z)|<\?.*?(?:\?>|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<(?=[\w:/])",
@@ -29,7 +29,7 @@ _DASH = "\u2010"
 
 
 class XmlError(ValueError):
-    """A file that cannot be read, and where."""
+    """A file that cannot be read, and the place."""
 
     def __init__(self, file: str, line: int, column: int, why: str) -> None:
         super().__init__(f"{file}:{line}:{column}: {why}")
@@ -75,11 +75,11 @@ def parse(text: str, name: str) -> Element:
 
 
 Shifts = dict[int, list[tuple[int, int]]]
-"""By line: the columns behind which so many characters are more than there were."""
+"""The columns behind which characters were added, and how many, by line."""
 
 
 def escaped(text: str) -> tuple[str, Shifts]:
-    """Escape `<` and `&` in quoted attributes, and `&` outside; tell what moved."""
+    """Escape `<` and `&` in quoted attributes, and `&` outside; return what moved."""
     out: list[str] = []
     shifts: Shifts = defaultdict(list)
     line, start = 1, 0  # of the line, in the new text
@@ -122,7 +122,7 @@ def escaped(text: str) -> tuple[str, Shifts]:
 
 
 def _comment(written: str) -> str:
-    """A comment as XML takes one: without two dashes in it."""
+    """Return a comment in XML's form: without two dashes in it."""
     inside = written[4:-3]
     if "--" in inside or inside.endswith("-"):
         inside = inside.replace("-", _DASH)

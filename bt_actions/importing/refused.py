@@ -1,4 +1,4 @@
-"""What cannot be said: the rows of refused.yaml."""
+"""XML that has no equal here: the rows of refused.yaml."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import yaml
 
 
 class Row(NamedTuple):
-    """Why something cannot be said, and what to write by hand."""
+    """Why there is no equal, and what to write by hand."""
 
     why: str
     instead: str

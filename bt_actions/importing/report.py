@@ -1,4 +1,4 @@
-"""What became of each node, attribute and script: nothing is left out in silence."""
+"""The report: the outcome of each node, attribute and script. Nothing is left out in silence."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from bt_actions.importing.reading import Element
 
 
 class Verdict(IntEnum):
-    """What became of something; the graver one wins where it was written twice."""
+    """The outcome of a part; the graver one wins for a part that was written twice."""
 
     CONVERTED = 0
     DIFFERS = 1
@@ -24,7 +24,7 @@ class Verdict(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """What became of one thing; `what` is node, attribute or tree."""
+    """The outcome of one part; `what` is node, attribute or tree."""
 
     file: str
     line: int
@@ -47,19 +47,19 @@ class Report:
 
     _entries: dict[tuple[int, str], Entry] = field(default_factory=dict)
     _elements: list[Element] = field(default_factory=list)
-    """Kept, so that the id of one is not another's."""
+    """Kept, so that no new element gets the id of an old one."""
     trees: list[Entry] = field(default_factory=list)
 
     def node(self, element: Element, verdict: Verdict, why: str = "") -> None:
-        """Tell what became of a node."""
+        """Tell the outcome of a node."""
         self._add(element, "", "node", element.attributes.get("ID", element.tag), verdict, why)
 
     def attribute(self, element: Element, name: str, verdict: Verdict, why: str = "") -> None:
-        """Tell what became of an attribute, or of the script in it."""
+        """Tell the outcome of an attribute, or of the script in it."""
         self._add(element, name, "attribute", name, verdict, why)
 
     def tree(self, element: Element, name: str, verdict: Verdict, why: str = "") -> None:
-        """Tell what became of a tree, or of a whole file."""
+        """Tell the outcome of a tree, or of a whole file."""
         place = element.file, element.line, element.column
         entry = Entry(*place, "tree", name, verdict, why)
         if entry not in self.trees:
@@ -75,7 +75,7 @@ class Report:
             self._entries[id(element), key] = Entry(*place, what, name, verdict, why)
 
     def knows(self, element: Element) -> bool:
-        """Return whether anything was told of a node."""
+        """Return whether a node has an entry."""
         return (id(element), "") in self._entries
 
     def __iter__(self) -> Iterator[Entry]:
@@ -89,7 +89,7 @@ class Report:
         return [entry for entry in self._entries.values() if entry.what == "node"]
 
     def summary(self) -> str:
-        """Return one line: how many nodes were converted, and how many not."""
+        """Return one line: the numbers of converted nodes, and of others."""
         counts = Counter(entry.verdict for entry in self.nodes())
         told = [f"{counts[verdict]} {verdict}" for verdict in Verdict if counts[verdict]]
         return f"{len(self.nodes())} nodes: {', '.join(told)}"

@@ -57,7 +57,7 @@ def _sort_of(project: Project) -> Callable[[str], Sort]:
 
 def _reference(project: Project, scope: Scope) -> Callable[[str], str]:
     def reference(name: str) -> str:
-        """What stands behind the dollar sign; a value, where \\0 takes that away."""
+        """Return the words behind the dollar sign; a value, whose \\0 takes that sign away."""
         if name in project.mapping.constants:
             return f"\0{project.mapping.constants[name]}"
         if name in scope.literals:
@@ -74,7 +74,7 @@ def _literal(value: object) -> str:
 
 
 def _checked(text: str) -> str:
-    """An expression that our language takes. Raises Refused."""
+    """Return an expression that our language takes. Raises Refused."""
     text = text.replace("$\0", "")
     try:
         Expression(text, roots=())

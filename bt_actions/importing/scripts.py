@@ -1,8 +1,8 @@
-"""Scripts of BehaviorTree.CPP, said as expressions of ours.
+"""Scripts of BehaviorTree.CPP as expressions of ours.
 
 Its scripts know numbers and texts: `true` is 1.0, and `!`, `&&` and `?` take numbers. Ours tell
-true and false from numbers. So each part of a script has a sort, and where another one is needed
-the text converts: `$n != 0`, `1 if $on else 0`, `float($text)`.
+true and false from numbers. So each part of a script has a sort, and a part of another sort than
+the needed one is converted: `$n != 0`, `1 if $on else 0`, `float($text)`.
 
 The grammar is that of its 4.10, with one surprise: `&&` and `||` bind equally, from the left.
 """
@@ -30,7 +30,7 @@ _BINDING = {  # of ours, the loosest first
 }
 _ATOM = 9
 _LEVELS = (("&&", "||"), (), ("|", "^"), ("&",), ("..",), ("+", "-"), ("*", "/"))
-"""Signs between two parts, the loosest first; comparisons stand where nothing is."""
+"""Signs between two parts, the loosest first; comparisons have the empty place."""
 _COMPARED = ("==", "!=", "<", "<=", ">", ">=")
 _ASSIGNED = (":=", "=", "+=", "-=", "*=", "/=")
 BITS = frozenset("&|^~")
@@ -41,11 +41,11 @@ LONGEST = 200
 
 
 class ScriptError(ValueError):
-    """A script that cannot be read, or cannot be said here."""
+    """A script that cannot be read, or has no equal here."""
 
 
 class Refused(ScriptError):
-    """Something that our language cannot say; `what` is its row in refused.yaml."""
+    """A part without an equal in our language; `what` is its row in refused.yaml."""
 
     def __init__(self, what: str, detail: str = "") -> None:
         super().__init__(detail or what)
@@ -53,7 +53,7 @@ class Refused(ScriptError):
 
 
 class Sort(Enum):
-    """What a value is."""
+    """The sort of a value."""
 
     TRUTH = "bool"
     NUMBER = "float64"
@@ -66,12 +66,12 @@ class Part(NamedTuple):
 
     kind: str
     signs: tuple[str, ...]
-    """The sign, the signs of a comparison, or what an atom is."""
+    """The sign, the signs of a comparison, or the word of an atom."""
     parts: tuple[Part, ...] = ()
 
 
 class Statement(NamedTuple):
-    """A value that is given to a variable; `name` is empty where nothing is done with it."""
+    """A value for a variable; `name` is empty where nothing is done with the value."""
 
     name: str
     sign: str
@@ -86,7 +86,7 @@ class Said(NamedTuple):
     binds: int = _ATOM
 
     def inside(self, least: int) -> str:
-        """Return the text as a part of something that binds as `least` does."""
+        """Return the text as a part of an expression that binds as `least` does."""
         return self.text if self.binds >= least else f"({self.text})"
 
 
@@ -106,7 +106,7 @@ def condition(code: str) -> Part:
 
 class _Reader:
     def __init__(self, code: str) -> None:
-        """Raises ScriptError for what no script can hold, and for a very long statement."""
+        """Split a script into words. Raises ScriptError for a wrong word or a very long statement."""
         self._tokens: list[tuple[str, str]] = []
         at, words, code = 0, 0, code.strip()
         while at < len(code):
@@ -213,12 +213,12 @@ def has_bits(part: Part) -> bool:
 
 @dataclass
 class Sorts:
-    """What the variables of a tree are, by all that is written to them and done with them."""
+    """The sorts of a tree's variables, from all that is written to them and done with them."""
 
     told: dict[str, set[Sort]] = field(default_factory=dict)
-    """By what is written."""
+    """The sorts of written values."""
     used: dict[str, set[Sort]] = field(default_factory=dict)
-    """By what is done with them."""
+    """The sorts that uses need."""
     _later: list[tuple[str, Part]] = field(default_factory=list)
     _alike: list[tuple[str, str]] = field(default_factory=list)
 
@@ -229,7 +229,7 @@ class Sorts:
         return Sort.NUMBER if found == {Sort.TRUTH, Sort.NUMBER} else Sort.ANY
 
     def add_text(self, name: str, text: str) -> None:
-        """Take note of a text that is written, which stands for a number where one is needed."""
+        """Note a written text, which stands for a number where one is needed."""
         if re.fullmatch(r"\s*-?\d+(\.\d*)?([eE][-+]?\d+)?\s*", text):
             self._tell(name, Sort.NUMBER)
         elif text in ("true", "false"):
@@ -238,7 +238,7 @@ class Sorts:
             self._tell(name, Sort.TEXT)
 
     def add(self, code: Iterable[Statement], key: Callable[[str], str] = str) -> None:
-        """Take note of a script; `key` gives a name of it the name that it has here."""
+        """Note a script; `key` returns the name here of a name in the script."""
         for name, sign, value in code:
             self._use(value, Sort.ANY, key)
             if name and value.kind == "name":
@@ -249,7 +249,7 @@ class Sorts:
                 self._tell(key(name), Sort.NUMBER)
 
     def settle(self) -> None:
-        """Follow what variables are given from each other, when all is noted."""
+        """Share sorts among variables that take values from each other, once all is noted."""
         for _ in range(3):
             for name, value in self._later:
                 if (sort := say(value, self.__getitem__, str, check=False).sort) is not Sort.ANY:
@@ -259,15 +259,15 @@ class Sorts:
                     self.use(one, self[other])
 
     def add_condition(self, asked: Part, key: Callable[[str], str] = str) -> None:
-        """As `add`, of a condition."""
+        """Note a condition, as `add` notes a script."""
         self._use(asked, Sort.TRUTH, key)
 
     def alike(self, one: str, other: str) -> None:
-        """Take note that two variables are of one sort."""
+        """Note that two variables are of one sort."""
         self._alike.append((one, other))
 
     def use(self, name: str, sort: Sort) -> None:
-        """Take note of what a variable is used as."""
+        """Note a use of a variable."""
         self.used.setdefault(name, set()).add(sort)
 
     def _tell(self, name: str, sort: Sort) -> None:
@@ -310,9 +310,9 @@ def say(
     *,
     check: bool = True,
 ) -> Said:
-    """Say a part in our words; `reference` gives what stands for a name behind the dollar sign.
+    """Say a part in our words; `reference` returns the words behind the dollar sign for a name.
 
-    Raises Refused, but for what `check` leaves out.
+    Raises Refused, but for parts that `check` leaves out.
     """
 
     def inner(each: Part) -> Said:
@@ -378,7 +378,7 @@ def _computed(sign: str, left: Said, right: Said) -> Said:
 
 
 def _comparison(signs: tuple[str, ...], sides: list[Said]) -> Said:
-    """A chain; of pairs where a side is compared as two things."""
+    """Return a chain of comparisons; pairs, where a side is compared as two sorts."""
     pairs = [
         _alike(sign, left, right)
         for sign, left, right in zip(signs, sides, sides[1:], strict=False)
@@ -398,7 +398,7 @@ def _comparison(signs: tuple[str, ...], sides: list[Said]) -> Said:
 
 
 def _alike(sign: str, left: Said, right: Said) -> tuple[Said, Said]:
-    """Two sides of a comparison as values that can be compared here."""
+    """Return two sides of a comparison as values that can be compared here."""
     sorts = {left.sort, right.sort}
     if sorts == {Sort.TRUTH} and sign in ("==", "!="):
         return left, right
@@ -414,7 +414,7 @@ def _alike(sign: str, left: Said, right: Said) -> tuple[Said, Said]:
 
 
 def truth(said: Said) -> Said:
-    """Return what is true where BehaviorTree.CPP takes the value for true."""
+    """Return an expression that is true where BehaviorTree.CPP takes the value for true."""
     if said.sort in (Sort.NUMBER, Sort.TEXT):
         nothing = "0" if said.sort is Sort.NUMBER else "''"
         return Said(f"{said.inside(_BINDING['+'])} != {nothing}", Sort.TRUTH, _BINDING["=="])
@@ -446,7 +446,7 @@ def assigned(
 
 
 def constant(said: Said) -> bool | int | float | str | None:
-    """Return the value of what reads nothing; None for what is computed."""
+    """Return the value of an expression without variables; None for any other."""
     if said.text in ("true", "false"):
         return said.text == "true"
     if re.fullmatch(r"-?\d+", said.text):

@@ -1,7 +1,7 @@
-"""Kinds of one's own, to be written, for what nothing is known of: their ports, and their classes.
+"""Kinds to be written, in place of nodes without a map: their ports, and their classes.
 
-Whether a port is read or written says the XML's TreeNodesModel; else it is read. Its type is that
-of the model, of a variable that is given to it, or of a value.
+The XML's TreeNodesModel says whether a port is read or written; without one it is read. The type is
+that of the model, of a variable that is given to the port, or of a value.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class ToWrite(Behaviour):
 
 @dataclass(slots=True)
 class Stub:
-    """A kind that is to be written."""
+    """A kind to be written."""
 
     name: str
     inputs: dict[str, object] = field(default_factory=dict)
@@ -61,7 +61,7 @@ class Stub:
 
     @property
     def declaration(self) -> dict[str, object]:
-        """What a tree that uses it declares."""
+        """The declaration in a tree that uses the kind."""
         made: dict[str, object] = {"python": f"{MODULE}.{self.name}"}
         if self.inputs:
             made["inputs"] = self.inputs
@@ -71,7 +71,7 @@ class Stub:
 
 
 def stub_of(project: Project, kind: str) -> Stub:
-    """Return what stands for a kind, as all trees use it."""
+    """Return the stub of a kind, as all trees use it."""
     uses = [
         element
         for definition in project.trees.values()
@@ -102,7 +102,7 @@ def _tree_of(element: Element) -> str:
 
 
 def _type(project: Project, kind: str, port: str, texts: Iterable[str]) -> str:
-    """Return the type that all that is given to a port has; that of texts where there are two."""
+    """Return the common type of all values of a port; string for two types."""
     variables = {text: variable_in(text, port) for text in texts}
     found = {
         _of_literal(text) if name is None else project.type_of(name)
@@ -133,7 +133,7 @@ def _as(kind: str, reference: str | None, given: str) -> str | None:
 
 
 def stub_node(given: Given, why: str) -> Node:
-    """Write a node of a kind that is to be written."""
+    """Write a node of a kind to be written."""
     project, scope = given.writer.project, given.scope
     kind = _tree_of(given.element) or given.kind
     stub = project.stubs.get(kind)
@@ -169,7 +169,7 @@ def stub_node(given: Given, why: str) -> Node:
 
 
 def module(stubs: Iterable[Stub]) -> str:
-    """Return the classes that are to be written, as a module."""
+    """Return the classes to be written, as a module."""
     return _HEAD + "".join(map(_class, sorted(stubs, key=lambda stub: stub.name)))
 
 

@@ -1,4 +1,4 @@
-"""Nodes of a tree as YAML, to be formatted; comments stand before what they were written before."""
+"""Nodes of a tree as YAML, to be formatted; comments stay before the nodes they stood before."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class Node(dict[str, Any]):
     def __init__(self, *given: Any, **keys: Any) -> None:
         super().__init__(*given, **keys)
         self.comments: list[str] = []
-        """Before it."""
+        """The comments before the node."""
         self.last: list[str] = []
-        """Behind its children."""
+        """The comments behind its children."""
         self.dropped = False
-        """Whether it only keeps the place of what has no meaning here."""
+        """Whether the node only keeps the place of one without a meaning here."""
 
 
 def document(tree: Mapping[str, Any], comments: Iterable[str] = ()) -> str:

@@ -1,7 +1,7 @@
-"""One tree of ours, from one of the XML: its nodes, its variables, what it declares.
+"""One tree of ours, from one of the XML: its nodes, its variables, its declarations.
 
-`kinds.py` has what becomes of each kind of node; here is what all nodes have in common: their
-names, comments and conditions, and subtrees.
+`kinds.py` has a function for each kind of node; the common parts of all nodes are here: names,
+comments, conditions, and subtrees.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from bt_actions.importing.stubs import stub_node
 from bt_actions.importing.text import Node
 
 _PACING = ("RateController", "GoalUpdatedController")
-"""What means something to the pipeline around it alone."""
+"""Kinds with a meaning for the pipeline around them alone."""
 _CONCURRENT = re.compile(r"Parallel|Reactive|Pipeline|WhileDoElse|Switch|Timeout|NonblockingSeq")
 
 
@@ -57,7 +57,7 @@ class Writer:
         self._kinds, self._called = kinds, called
         self.definition = definition
         self.above: list[str] = []
-        """The kinds of the nodes around the one that is written."""
+        """The kinds of the nodes around the current one."""
         self.words: dict[str, dict[str, Any]] = {"actions": {}, "topics": {}, "kinds": {}}
         self.imports: set[str] = set()
         self._inside: list[Definition] = [definition]
@@ -132,7 +132,7 @@ class Writer:
     # A node
 
     def node(self, element: Element, scope: Scope) -> Node:
-        """Write a node, with what its attributes put around it."""
+        """Write a node, inside of the nodes that its attributes put around it."""
         self.report.node(element, Verdict.CONVERTED)
         given = Given(self, element, scope)
         try:
@@ -254,7 +254,7 @@ class Writer:
         return node
 
     def _passed(self, given: Given, inner: Definition, name: str, outer: str | None) -> object:
-        """The value that a subtree's input gets."""
+        """Return the value for a subtree's input."""
         ports = dict(ports_of(given.element))
         if outer is None and name in ports:
             return value_of(ports[name], self.project.type_of(name))
@@ -268,7 +268,7 @@ class Writer:
         return f"${given.scope[outer]}"
 
     def _inlined(self, given: Given, inner: Definition) -> Node:
-        """A tree that is written into this one, as its ports are other names and no copies."""
+        """Write a tree into this one, whose ports are other names and no copies."""
         element, scope = given.element, given.scope
         prefix = f"{identifier(element.attributes.get('name') or inner.name)}_"
         ports = dict(ports_of(element))
