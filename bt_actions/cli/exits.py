@@ -1,4 +1,4 @@
-"""How a command ends: the exit codes, bad input, and ROS that is not there or cannot start.
+"""The end of a command: exit codes, bad input, and a ROS that is missing or cannot start.
 
 Imports nothing slow: every call of `bt-actions` loads this file.
 """
@@ -22,30 +22,30 @@ class Exit(IntEnum):
     FAILURE = 1
     BAD_INPUT = 2
     UNKNOWN = 3
-    """The end of a goal is not known: it may still be running. Wins over all others."""
+    """The end of a goal is not known: the goal may still run. Wins over all other codes."""
     TIMEOUT = 124
     SIGHUP = 129
     SIGINT = 130
     SIGQUIT = 131
     SIGPIPE = 141
-    """Nobody reads standard output any more."""
+    """Standard output has no reader any more."""
     SIGTERM = 143
 
 
 class BadInput(Exception):
-    """What the user gave cannot be used; the text says what, where and what to do. Exit code 2."""
+    """Input that cannot be used; the text says what, where and what to do. Exit code 2."""
 
     def __init__(self, message: str, *, prefixed: bool = True) -> None:
-        """`prefixed` is False for messages that begin with their own file:line:column."""
+        """Take the text; `prefixed` is False for one that begins with its own file:line:column."""
         super().__init__(message)
         self.prefixed = prefixed
 
 
 @contextlib.contextmanager
 def importing_ros() -> Iterator[None]:
-    """Turn an import of ROS that fails into BadInput.
+    """Turn a failed import of ROS into BadInput.
 
-    Raises KeyboardInterrupt where that is why: a C extension makes an ImportError of it.
+    Raises KeyboardInterrupt where that is the cause: a C extension makes an ImportError of it.
     """
     try:
         yield
@@ -62,7 +62,7 @@ HIGHEST_DOMAIN = 232
 
 
 def refuse_domain() -> None:
-    """Raise BadInput for what is no ROS domain; of one too high, Fast DDS would end the process."""
+    """Raise BadInput for what is no ROS domain; at one too high, Fast DDS ends the process."""
     domain = os.environ.get("ROS_DOMAIN_ID", "")
     digits = domain.strip().removeprefix("+").lower()
     base = 16 if digits.startswith("0x") else 8 if digits.startswith("0") else 10  # as rcl reads it
@@ -74,7 +74,7 @@ def refuse_domain() -> None:
 
 @contextlib.contextmanager
 def starting_ros() -> Iterator[None]:
-    """Turn what ROS raises when it is first touched into BadInput."""
+    """Turn an error of ROS's first use into BadInput."""
     refuse_domain()
     try:
         yield

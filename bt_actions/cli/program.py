@@ -1,4 +1,4 @@
-"""Composes the commands: their parsers, what each ends with, and what the user is told of it.
+"""The commands put together: their parsers, their ends, and the words of an end for the user.
 
 Nothing here knows what a command does.
 """
@@ -43,7 +43,7 @@ COMMANDS = {
     "schema": "schema",
     "render": "render",
 }
-"""Each with its module in `commands/`, in the order in which --help lists them."""
+"""The module of each command in `commands/`, in the order of --help."""
 
 _EPILOG = """\
 examples:
@@ -60,7 +60,7 @@ exit codes:
 
 
 class _Version(argparse.Action):
-    """Looks the version up only where it is asked for, which takes 20 ms."""
+    """Looks the version up on demand: the look takes 20 ms."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         write(f"bt-actions {_version()}\n")
@@ -85,12 +85,12 @@ def build_parser(only: str = "") -> Parser:
 
 
 def _module(command: str) -> ModuleType:
-    """Imported when it is wanted: a command does not wait for what the others need."""
+    """Import the module of a command: no command waits for the imports of others."""
     return import_module(f"bt_actions.cli.commands.{COMMANDS[command]}")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; return its exit code. Never lets a traceback of bad input reach the user."""
+    """Run one command; return its exit code. Bad input never shows a traceback to the user."""
     if "_ARGCOMPLETE" in os.environ:  # a shell asks what it may offer
         from bt_actions.cli.arguments.completing import complete
 
@@ -150,9 +150,9 @@ def _version() -> str:
 
 
 def _flushed() -> bool:
-    """Flush what is left; say so when it cannot be written.
+    """Flush standard output and error; report a failure, and return whether there is none.
 
-    A reader that has gone must not make Python complain at exit.
+    Python must not complain at exit of a reader that has gone.
     """
     note("", end="")  # and the same for what is left for standard error
     try:

@@ -1,1 +1,1 @@
-"""What stands on a command line, read: options, ROS arguments, values, the tree that is meant."""
+"""The reading of a command line: options, ROS arguments, values, the tree."""

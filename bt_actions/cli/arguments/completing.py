@@ -1,7 +1,7 @@
-"""What a shell offers at TAB: argcomplete asks the parsers, and the functions here for some values.
+"""Answers to TAB in a shell: argcomplete asks the parsers, and the functions here for some values.
 
 A user waits for each answer, so nothing here imports py_trees or the checker. Where a function
-raises an error, as for a tree that is not there, the shell offers nothing.
+raises an error, as for a missing tree, the shell offers nothing.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def _trees(prefix: str, **_others: object) -> Iterable[str]:
 
 
 def _holds_tree(path: Path) -> bool:
-    """Whether a file is no library for trees to import, as far as its text tells at a glance."""
+    """Return whether a file holds a tree, rather than a library, as far as its text tells."""
     try:
         return re.search(rb"^tree:", path.read_bytes(), re.MULTILINE) is not None
     except OSError:
@@ -93,4 +93,4 @@ _VALUES = {
     "RUN": _runs,
     "watch NAME": _runs,
 }
-"""By the words that stand for values in help, of all commands or of one."""
+"""The answers, by the words that stand for values in help, of all commands or of one."""

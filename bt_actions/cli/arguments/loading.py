@@ -1,4 +1,4 @@
-"""The tree that a command is given, with the values of its inputs."""
+"""The tree of a command, with the values of its inputs."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def load(
 ) -> Behaviour:
     """Load a tree by path or by the name of an installed one, with `--set` words for its inputs.
 
-    Where they say nothing, ROS parameters by the names of inputs do: `parameters` gives them, for
-    the name of the tree. With `python=False` a tree with a `python:` node is refused, and nothing
-    it names is imported.
+    ROS parameters by the names of inputs fill the rest: `parameters` returns them for the name of
+    the tree. With `python=False` a tree with a `python:` node is refused, and nothing it names is
+    imported.
 
     Raises BadInput with all findings, or about the first input that does not fit.
     """
@@ -73,5 +73,5 @@ def load(
 
 
 def findings_text(error: DocumentError) -> str:
-    """What is wrong with a document, for standard error."""
+    """Return a document's findings, for standard error."""
     return "\n".join(finding.text(columns(sys.stderr)) for finding in error.findings)

@@ -1,4 +1,4 @@
-"""What stands on the command line of several commands: options, and how their words are read.
+"""Options that several commands share, and the reading of their words.
 
 Imports nothing slow: every call of `bt-actions` builds all parsers.
 """
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from bt_actions.simulation.faults import Fault
 
 MOST = 1000
-"""Goals, robots and the like that one server can be asked for."""
+"""The most goals, robots and the like of one server."""
 
 
 def number(
     what: str, kind: Callable[[str], Any] = float, least: float = -math.inf, most: float = math.inf
 ) -> Callable[[str], Any]:
-    """Return what reads a number within bounds; the error that argparse reports calls it `what`."""
+    """Return a reader of numbers within bounds; argparse's error calls the number `what`."""
 
     def read(text: str) -> Any:
         try:
@@ -41,7 +41,7 @@ speed = number("factor from 1e-05 to 100000", least=1e-5, most=1e5)
 
 
 def count(what: str) -> Callable[[str], Any]:
-    """Return what reads how many of something; the error calls them `what`."""
+    """Return a reader of counts; the error calls the counted things `what`."""
     return number(f"number of {what}, 1 to {MOST}", int, 1, MOST)
 
 
@@ -129,6 +129,6 @@ _SHORT = {"--quiet": "-q"}
 
 
 def add_option(parser: argparse._ActionsContainer, name: str, **other: Any) -> None:
-    """Add an option that several commands have; `other` replaces what it is elsewhere."""
+    """Add an option that several commands have; `other` replaces its usual settings."""
     names = [_SHORT[name], name] if name in _SHORT else [name]
     parser.add_argument(*names, **_SHARED[name] | other)

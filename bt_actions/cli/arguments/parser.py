@@ -19,11 +19,11 @@ from bt_actions.utilities.suggest import did_you_mean
 Subparsers: TypeAlias = "argparse._SubParsersAction[Parser]"  # noqa: SLF001 - no public name
 _PARAMETER = ("-p", "--param")
 _OF_ROS = (*_PARAMETER, "--params-file", "-r", "--remap")
-"""Options that count behind --ros-args alone."""
+"""Options that have a meaning behind --ros-args alone."""
 
 
 class Parser(argparse.ArgumentParser):
-    """argparse as this program uses it; subparsers are of the same class."""
+    """argparse with this program's habits; subparsers are of the same class."""
 
     def __init__(self, **settings: Any) -> None:  # argparse's own keyword arguments
         settings.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
@@ -32,14 +32,14 @@ class Parser(argparse.ArgumentParser):
 
     @property
     def commands(self) -> dict[str, argparse.ArgumentParser]:
-        """Return the parser of each command; empty for a command's own parser."""
+        """The parser of each command; empty for a command's own parser."""
         for action in self._actions:
             if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - no public name
                 return dict(action.choices)
         return {}
 
     def parse(self, arguments: Sequence[str]) -> argparse.Namespace:
-        """Parse `arguments`; print one line and exit with 2 when they are wrong."""
+        """Parse `arguments`; print one line and exit with 2 where they are wrong."""
         command = next((word for word in arguments if not word.startswith("-")), None)
         if command is None or command not in self.commands:
             if command is not None:
@@ -57,7 +57,7 @@ class Parser(argparse.ArgumentParser):
         return args
 
     def refuse(self, unknown: Sequence[str], settings: Sequence[str] = ()) -> NoReturn:
-        """Report arguments that nothing takes; `settings` are the words of --set."""
+        """Report arguments that no option takes; `settings` are the words of --set."""
         word = unknown[0]
         options = [name for action in self._actions for name in action.option_strings]
         is_value = not word.startswith("-") or word[1:2].isdigit()
@@ -76,7 +76,7 @@ class Parser(argparse.ArgumentParser):
         self.error(f"unexpected argument {word!r}")
 
     def _print_message(self, message: str, file: Any = None) -> None:
-        """As argparse does it, but output that is lost is an error."""
+        """Print as argparse does, but raise an error for lost output."""
         if file is sys.stdout:
             write(message)
         else:

@@ -1,7 +1,7 @@
-"""`--ros-args` of a command, as launch appends them; of a run, the parameters that are its inputs.
+"""`--ros-args` of a command, as launch appends them; those of a run hold parameters for inputs.
 
-The node of the command is told of all of them by rclpy, which reads `sys.argv` itself. What is
-given and used nowhere is told: an error where it is meant for this node alone, else a warning.
+rclpy reads `sys.argv` itself, and gives the node all of them. A parameter that nothing uses is
+reported: an error where it is meant for this node alone, else a warning.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def add_ros_args(parser: argparse.ArgumentParser, help_more: str = "") -> None:
-    """Add `--ros-args`, which takes all that follows."""
+    """Add `--ros-args`, which takes all words behind it."""
     parser.add_argument(
         "--ros-args",
         metavar="ARG",
@@ -37,8 +37,8 @@ def add_ros_args(parser: argparse.ArgumentParser, help_more: str = "") -> None:
 def parameters(words: Sequence[str], name: str, namespace: str = "") -> Given | None:
     """Return the parameters that `words` give to the command's node, without rclpy's own.
 
-    `name` and `namespace` are the node's, before remapping. What gives it nothing is told.
-    Raises BadInput for what rcl does not understand.
+    `name` and `namespace` are the node's, before remapping. Words that give the node nothing are
+    reported. Raises BadInput for words that rcl does not understand.
     """
     if not words:
         return None
@@ -72,10 +72,10 @@ def taken(
     with_fields: Collection[str] = (),
     other_users: bool = False,
 ) -> dict[str, object]:
-    """Return those parameters that are `known`, or fields of one `with_fields`.
+    """Return the parameters that are `known`, or fields of one `with_fields`.
 
     Raises BadInput for another one that is meant for this node, unless the node has `other_users`
-    of parameters and the name is like no known one. Tells of all others: a file gives some to
+    of parameters and the name is like no known one. Reports all others: a file gives some to
     other nodes, too. `what` is the noun for a known one.
     """
     if given is None:
@@ -99,8 +99,8 @@ def as_inputs(given: Given | None, declared: Mapping[str, TreeInput], tree: str)
     """Return parameters as the inputs that `declared` says `tree` has.
 
     A text for an input that is a message is read as YAML; ``at.x`` is a field of the input ``at``,
-    whose other fields are those of its default. Raises BadInput about the first
-    parameter that is no input, or does not fit.
+    whose other fields are those of its default. Raises BadInput about the first parameter that is
+    no input, or does not fit.
     """
     from bt_actions.document.language.types import parse_type
     from bt_actions.messages.conversion import MessageError, fill_value
@@ -130,7 +130,7 @@ def as_inputs(given: Given | None, declared: Mapping[str, TreeInput], tree: str)
 def _no_fit(
     given: Given | None, name: str, kind: str, values: Mapping[str, object], why: str
 ) -> str:
-    """Say that a parameter is no value of the input that it is, or is a field of."""
+    """Say that a parameter does not fit the input of its name, or the field of one."""
     from bt_actions.messages.conversion import show
 
     assert given is not None
@@ -155,7 +155,7 @@ def _no_fit(
 
 
 def _over(value: Any, fields: Any, kind: FieldType | None) -> Any:
-    """Return a value with some fields of it replaced, whatever way it is written."""
+    """Return a value with some fields replaced, in whatever form the value is."""
     from bt_actions.messages.conveniences import ANGLES
     from bt_actions.messages.conversion import fill_value, to_plain
     from bt_actions.messages.fields import Message, describe
@@ -175,7 +175,7 @@ def _over(value: Any, fields: Any, kind: FieldType | None) -> Any:
 
 
 def _read(value: Any, kind: FieldType | None) -> Any:
-    """Read the texts that stand for what is no parameter: a message, a list of them, a uint64."""
+    """Read the texts for types that no parameter has: a message, a list of messages, a uint64."""
     from bt_actions.document.language.values import names_file, read_data
     from bt_actions.document.reading.inputs import parse_text
     from bt_actions.messages.fields import Listing, Message, Scalar, describe
@@ -191,7 +191,7 @@ def _read(value: Any, kind: FieldType | None) -> Any:
 
 
 def _nodes_in(path: Path) -> Iterator[str]:
-    """Return the nodes, and patterns of them, that a file of parameters has sections for."""
+    """Yield the nodes, and patterns of nodes, with a section in a file of parameters."""
     from bt_actions.document.language.values import read_data
 
     with contextlib.suppress(ValueError, OSError):

@@ -1,7 +1,7 @@
-"""The `field=value` words of `bt-actions send`, read as the tree language reads values.
+"""The `field=value` words of `bt-actions send`, read as values of the tree language.
 
-A value that begins with a bracket, a brace or a quote is YAML; any other is one scalar, whatever
-else it holds, so that `message=hello: world # 1` is a text.
+A value that begins with a bracket, a brace or a quote is YAML. Any other value is one scalar, so
+`message=hello: world # 1` is a text.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ _OTHERWISE = re.compile(
     r"(?:([A-Za-z_][\w.]*)(?:\s*:?=\s*|:\s+)|([A-Za-z_]\w*)\s+)(?!--|:?=)(\S.*)",
     re.ASCII | re.DOTALL,
 )
-"""A name and its value, however written: `speed=2`, `speed:=2`, `speed: 2`, `speed 2`."""
+"""A name and its value, in any notation: `speed=2`, `speed:=2`, `speed: 2`, `speed 2`."""
 
 
 def split(word: str, what: str) -> tuple[str, str]:
@@ -31,14 +31,14 @@ def split(word: str, what: str) -> tuple[str, str]:
 
 
 def meant_by(words: Sequence[str]) -> str:
-    """Return `name=value` as the first of `words` mean it, or an empty text."""
+    """Return `name=value` as the first of `words` mean it, or ""."""
     texts = (" ".join(words[:many]) for many in (1, 2, 3))
     found = next(filter(None, map(_OTHERWISE.fullmatch, texts)), None)
     return f"{found[1] or found[2]}={found[3]}" if found else ""
 
 
 def goal_fields(words: Iterable[str], what: str = "field") -> dict[str, object]:
-    """Read `field=value` words, dotted names as nested fields; of two for one name the last counts.
+    """Read `field=value` words, dotted names as nested fields; the last word for a name counts.
 
     Raises BadInput that names the word, which is called `what`.
     """
@@ -50,7 +50,7 @@ def goal_fields(words: Iterable[str], what: str = "field") -> dict[str, object]:
 
 
 def value(text: str, where: str) -> object:
-    """Read one value; `where` begins the message when it cannot be read.
+    """Read one value; `where` begins the message of an error.
 
     Raises BadInput.
     """

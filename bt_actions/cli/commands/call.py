@@ -1,7 +1,7 @@
 """`bt-actions call TREE`: a tree of a server of trees, run as `run` runs a file.
 
-It is a tree of one RunTree leaf, so that the goal has the same life, deadlines and end as in any
-tree. What the server tells at the end is shown as if the tree had run here.
+The command runs a tree of one RunTree leaf, so the goal has the same life, deadlines and end as in
+any tree. The server's last words are shown as if the tree had run here.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Have the tree run, and see the goal to its end."""
+    """Let the server run the tree, and see the goal to its end."""
     if args.json:
         keep_results_apart()
     records = recorder(args)
@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _leaf(tree: str, server: str, inputs: dict[str, object], goal_name: str) -> RunTree:
-    """Check what can be checked without a server."""
+    """Return the leaf, after all checks that need no server."""
     from bt_actions.behaviours.run_tree import RunTree, inputs_text
 
     try:

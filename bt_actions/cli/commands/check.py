@@ -1,4 +1,4 @@
-"""`bt-actions check`: everything that can be read off a tree, at once, before a robot moves."""
+"""`bt-actions check`: everything that a tree's text tells, at once, before a robot moves."""
 
 from __future__ import annotations
 

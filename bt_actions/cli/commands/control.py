@@ -49,7 +49,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Ask the server, and say what it did."""
+    """Ask the server, and tell its answer."""
     beginning = args.goal.lower().replace("-", "")
     if not re.fullmatch("[0-9a-f]{0,32}", beginning):
         raise BadInput(

@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _walk(run: str, places: Places) -> tuple[Walk, str]:
-    """Return what the run did, and why nothing comes behind that."""
+    """Return the steps of a run, and the reason where more should follow."""
     from bt_actions.recording.comparing import Walk
     from bt_actions.recording.folders import is_written
     from bt_actions.recording.reading import RecordingError

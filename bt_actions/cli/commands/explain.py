@@ -1,4 +1,4 @@
-"""`bt-actions explain CODE`: what a rule is about, with a wrong and a right example."""
+"""`bt-actions explain CODE`: a rule, with a wrong and a right example."""
 
 from __future__ import annotations
 

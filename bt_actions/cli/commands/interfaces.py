@@ -1,4 +1,4 @@
-"""`bt-actions interfaces build|show|list`: message packages of one's own, and what there is."""
+"""`bt-actions interfaces build|show|list`: message packages of one's own, and installed ones."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def _build(args: argparse.Namespace) -> None:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[str, str], None]]:
-    """Show where a build is: in one line of a terminal, else a line for each step."""
+    """Show the progress of a build: in one line of a terminal, else a line for each step."""
     terminal = sys.stderr is not None and sys.stderr.isatty()
 
     def show(step: str, count: str) -> None:

@@ -41,7 +41,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Ask all servers in sight, and print what they say."""
+    """Ask all servers in sight, and print their trees."""
     no_parameters(args.ros_args, "list", "bt_actions_asks")
     keep_results_apart()
     with importing_ros():
@@ -66,7 +66,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def tree_data(tree: Any) -> dict[str, Any]:
-    """A TreeInfo as plain data; no text in it holds what a terminal obeys."""
+    """Return a TreeInfo as plain data, without characters that a terminal obeys."""
     from bt_actions.messages.conversion import to_plain
 
     state = _STATES[tree.state] if tree.state < len(_STATES) else str(tree.state)
@@ -87,7 +87,7 @@ def _cleaned(data: Any) -> Any:
 
 
 def text_of(servers: dict[str, list[dict[str, Any]] | None]) -> list[str]:
-    """The lines for people: a server, its trees, their inputs."""
+    """Return the lines for people: a server, its trees, their inputs."""
     lines: list[str] = []
     for server, trees in servers.items():
         lines.append(server)

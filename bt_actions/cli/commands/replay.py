@@ -1,4 +1,4 @@
-"""`bt-actions replay RUN`: see a recorded run again, forwards and backwards, at any speed."""
+"""`bt-actions replay RUN`: a recorded run again, forwards and backwards, at any speed."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _terminal() -> Console | None:
-    """The terminal to draw on, and to take keys from, where there is one."""
+    """Return the terminal to draw on, and to take keys from, where there is one."""
     if not (sys.stdin and sys.stdin.isatty() and sys.stdout.isatty()):
         return None
     from rich.console import Console

@@ -1,4 +1,4 @@
-"""`bt-actions report`: why a recorded run ended as it did, on the terminal or in a file."""
+"""`bt-actions report`: the end of a recorded run and its cause, on the terminal or in a file."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """`bt-actions run TREE`: run a tree to its end, and see every goal to its end.
 
-Puts together what others do: loads the tree (document), starts the servers (simulation), ticks
-(runner), shows (views), and turns the end into an exit code (drive).
+The parts come from other rooms: document loads the tree, simulation has the servers, runner ticks,
+views show, and drive turns the end into an exit code.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _node_name(args: argparse.Namespace, tree: str) -> str:
-    """Return the name that the node of the run is to have, before remapping."""
+    """Return the name of the run's node, before remapping."""
     from bt_actions.ros.naming import node_name as name_for
 
     name: str = args.name or name_for(tree)

@@ -32,7 +32,7 @@ examples:
 `bt-actions report RUN` tells one of them.
 """
 _LEAST = 40
-"""Columns that a cause needs; where there are less it has a line of its own."""
+"""Columns that a cause needs; where there are fewer, the cause has a line of its own."""
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -93,7 +93,7 @@ def _goes_on(run: Recorded) -> bool:
 
 
 def data(run: Recorded) -> dict[str, object]:
-    """Return what is known of a run without its events, as JSON has it."""
+    """Return a run's summary for JSON, without its events."""
     summary = run.summary
     return {
         "run": summary.run_id,
@@ -147,7 +147,7 @@ def _row(run: Recorded) -> tuple[str, str, str, str, str, str]:
 
 
 def _finish(runs: list[Recorded]) -> None:
-    """Finish what killed processes left, for other readers of these files."""
+    """Finish the recordings of killed processes, for other readers of these files."""
     left = [each for each in runs if not each.summary.status and not each.is_written]
     if not left:
         return

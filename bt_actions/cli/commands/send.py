@@ -1,6 +1,6 @@
 """`bt-actions send SERVER TYPE [FIELD=VALUE]...`: one goal from the command line.
 
-It is a tree of one leaf, so that the goal has the same life, deadlines and end as in any tree.
+The command runs a tree of one leaf: the goal has the same life, deadlines and end as in any tree.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _leaf(server: str, type_name: str, data: dict[str, object]) -> ActionBehaviour:
-    """Check everything that can be checked without a server."""
+    """Return the leaf, after all checks that need no server."""
     from bt_actions.messages.conversion import MessageError, fill
     from bt_actions.messages.interfaces import UnknownInterface, called
 

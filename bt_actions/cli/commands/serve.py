@@ -1,8 +1,8 @@
 """`bt-actions serve`: trees in folders as one action, for other nodes to run by name, until Ctrl-C.
 
-Prints one line: `ready: ...` when goals are accepted, `unconfigured: ...` with --managed. Where
-another server of the action comes first, `waiting: ...` is printed before. What happens to goals
-goes to the log.
+The command prints one line: `ready: ...` once goals are accepted, `unconfigured: ...` with
+--managed. Behind another server of the action, it prints `waiting: ...` before. The log tells of
+goals.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ _HELP = {
     "python": "a package whose classes the trees' python: nodes may name; repeatable",
     "managed": "stay unconfigured, until a lifecycle manager configures and activates it",
 }
-"""Of the options that are parameters of the node, too."""
+"""Help for the options that are parameters of the node, too."""
 
 
 def add_parser(subparsers: Subparsers) -> None:
@@ -110,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _close(server: TreeServer, signals: Signals) -> None:
-    """Close the server; one more signal ends the wait, and a run that does not end then is left."""
+    """Close the server; one more signal ends the wait, and leaves a run that does not end then."""
     signals.during(server.close, lambda _: server.abandon())
     for each in server.stuck:
         note(f"bt-actions serve: may still be running: {each}")
@@ -126,7 +126,7 @@ def _conclude(server: TreeServer, code: Exit) -> Exit:
 
 
 def _clean_up() -> Exit:
-    """Cancel what a killed server left, where one is on record; other starts lose no time."""
+    """Cancel the goals of a killed server, where one is on record; other starts lose no time."""
     with importing_ros():
         from bt_actions.serving.underway import left_underway
 
@@ -155,7 +155,7 @@ def _clean_up() -> Exit:
 
 
 def _options(args: argparse.Namespace, given: Mapping[str, object]) -> dict[str, Any]:
-    """What is served and how: of the command line, or else of the parameters. Raises BadInput."""
+    """Return the server's settings, of the command line or of parameters. Raises BadInput."""
     options = {name: getattr(args, name) for name in _HELP}
     for name, option in options.items():
         if option is None and name in given:

@@ -1,7 +1,7 @@
 """`bt-actions sim`: simulated robots in a process of their own, until Ctrl-C.
 
-Prints one line `ready: ...` when the servers are up, and a line for whatever happens to a part. A
-standard output that nobody reads any more does not end it: it is a server.
+The command prints one line `ready: ...` once the servers are up, and a line for each event of a
+part. A standard output without a reader does not end it: it is a server.
 """
 
 from __future__ import annotations

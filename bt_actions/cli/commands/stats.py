@@ -1,4 +1,4 @@
-"""`bt-actions stats`: how often each action succeeds, and how long it takes, over all runs."""
+"""`bt-actions stats`: the successes and the durations of each action, over all runs."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _add(statistics: Statistics, run: Recorded) -> bool:
-    """Count one run; say what of it cannot be read."""
+    """Count one run; report the parts of it that cannot be read."""
     from bt_actions.recording.folders import held
     from bt_actions.recording.reading import Recording, RecordingError
 

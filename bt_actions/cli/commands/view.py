@@ -67,7 +67,7 @@ def add_parser(subparsers: Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve the page until somebody stops it."""
+    """Serve the page until a signal, or for as long as browsers look."""
     from bt_actions.recording.folders import NoRun, find
 
     need_page()

@@ -1,4 +1,4 @@
-"""`bt-actions watch`: what runs now, in a terminal: what it waits for, and why it failed."""
+"""`bt-actions watch`: the runs that go on, in a terminal: their waits, and causes of failures."""
 
 from __future__ import annotations
 

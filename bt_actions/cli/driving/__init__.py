@@ -1,1 +1,1 @@
-"""A command while it runs: signals, the run of a tree or of a server, and the order of its end."""
+"""A running command: signals, the run of a tree or of a server, and the order of the end."""

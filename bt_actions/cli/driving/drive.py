@@ -1,7 +1,7 @@
-"""Drives one run from the main thread: waits for events and signals, feeds state and view.
+"""The drive of one run from the main thread: wait for events and signals, feed state and view.
 
-The tree ticks on its own threads. Here is decided what ends a run from outside (a signal, the
---timeout, a closed standard output), and what exit code it all makes. Never touches a behaviour.
+The tree ticks on its own threads. This file decides which outside cause ends a run (a signal, the
+--timeout, a closed standard output), and which exit code follows. It never touches a behaviour.
 """
 
 from __future__ import annotations
@@ -32,33 +32,33 @@ from bt_actions.running.telling import where_raised
 from bt_actions.story.state import State
 
 GATHER = 0.02
-"""Seconds for which events gather before they are taken: each time takes Python's lock."""
+"""Seconds in which events gather before they are taken: each take needs Python's lock."""
 FRAME = 0.1
 """Seconds between two drawings where nothing happens."""
 PATIENCE_WHEN_LEFT = 1.0
-"""Seconds for the output to be written where the user did not wait for the goals."""
+"""Seconds for the writing of output after a user who did not wait for the goals."""
 NEARLY_OVER = 1.0
-"""Seconds for a run with no goal left to wait for to be over, where the user will not wait."""
+"""Seconds for a run without open goals to end, after a user who will not wait."""
 _LOOK = 0.02
-"""Seconds between two looks for signals while only the output is waited for."""
+"""Seconds between two looks for signals while only the output is open."""
 
 Judge = Callable[[Exit], tuple[Exit, str]]
-"""What a command makes of the exit code: another one, and what is wrong with what was asked for."""
+"""A command's judgement: another exit code, and what is wrong with the request."""
 
 
 class Runner(Protocol):
-    """What this file needs of whoever runs the tree."""
+    """The runner of a tree, as far as a drive needs one."""
 
     @property
     def stream(self) -> Stream:
-        """What happens in the run."""
+        """The events of the run."""
 
     def interrupt(self, *, abandon: bool = False) -> None:
         """Make the run drain and return; with `abandon`, drain no longer."""
 
 
 class Drive:
-    """One run of one tree, watched by one view."""
+    """One run of one tree, with one view."""
 
     def __init__(
         self,
@@ -72,8 +72,11 @@ class Drive:
         clock: Callable[[], float] = time.monotonic,
         output: PatientOutput | None = None,
     ) -> None:
-        """`tick_to_end` runs the tree to its end, drains its goals, and closes what belongs to it;
-        `output` is what the view writes to, where that is written later."""
+        """Take the parts of a run.
+
+        `tick_to_end` runs the tree to its end, drains its goals, and closes its nodes. `output` is
+        the view's output where that is written later.
+        """
         self._runner = runner
         self._tick_to_end = tick_to_end
         self._output = output
@@ -87,11 +90,11 @@ class Drive:
         self._finished = threading.Event()
         self._error: BaseException | None = None
         self._stopped_at: float | None = None
-        """When the run was first asked to end."""
+        """The moment of the first request to end."""
         self.abandoned = False
-        """The user did not wait for the goals to end: threads are still running."""
+        """Whether the user did not wait for the ends of goals: threads still run."""
         self._takes = self._lost = False
-        """Whether something could not be shown."""
+        """Whether some output was lost."""
         self._watched = pipe_of_stdout()
 
     def run(self) -> None:
@@ -141,7 +144,7 @@ class Drive:
             self._signals.poke()
 
     def _take_events(self) -> None:
-        """Take in what has come, in order; what comes up meanwhile is taken by the same call."""
+        """Take all events in order, also those that come in meanwhile."""
         if self._takes:
             return
         self._takes = True
@@ -157,14 +160,14 @@ class Drive:
             self.abandoned = True
 
     def _end(self, code: Exit, cause: str) -> None:
-        """End the run from outside; the first reason stands."""
+        """End the run from outside; the first cause stands."""
         self._stopped_at = self._clock()
         self._runner.stream.add(StopWanted, code.name, cause)
         self._take_events()
         self._runner.interrupt()
 
     def _show(self, draw: Callable[[], None]) -> None:
-        """Let the view draw; a view that fails is given up, and the robot goes on."""
+        """Let the view draw; give up a view that fails, while the robot goes on."""
         try:
             draw()
         except BrokenPipeError:
@@ -179,7 +182,7 @@ class Drive:
             note(f"bt-actions: nothing more can be shown, and the run goes on: {error}")
 
     def _nobody_reads(self) -> None:
-        """Standard output is closed: end the run, and write to nowhere from now on."""
+        """End the run after a closed standard output, and write to nowhere."""
         self._watched = -1
         with contextlib.suppress(OSError):
             results().flush()
@@ -188,7 +191,7 @@ class Drive:
             self._end(Exit.SIGPIPE, "standard output was closed")
 
     def _await_the_list(self) -> None:
-        """Let the runner say how its goals stand, which takes a moment, but not for long."""
+        """Wait, not for long, until the runner has said how its goals stand."""
         self._runner.interrupt(abandon=True)
         began = self._clock()
         while self._state.finished is None:
@@ -201,9 +204,9 @@ class Drive:
         self._take_events()
 
     def _await_readers(self) -> None:
-        """Let who reads slowly get everything; a signal, or the --timeout, ends the wait.
+        """Wait for slow readers to get everything; a signal, or the --timeout, ends the wait.
 
-        Not a --timeout that has passed before, while the tree was shut down.
+        A --timeout that passed earlier, at the shutdown of the tree, does not count.
         """
         if self._output is None:
             return
@@ -226,9 +229,9 @@ class Drive:
     def finish(
         self, world: str = "", complaint: str = "", judge: Judge = lambda code: (code, "")
     ) -> Exit:
-        """Show the end; return the exit code. A success that nobody could be told is none.
+        """Show the end; return the exit code. A success that no reader could get is a failure.
 
-        `world` and `complaint` are what the simulation says in the end.
+        `world` and `complaint` are the last words of the simulation.
         """
         told = self._state.finished is not None and bool(self._state.finished.error)
         raised = self._error is not None and not told
@@ -257,7 +260,7 @@ class Drive:
 
 
 def code_of(state: State, *, raised: bool = False, complaint: str = "") -> Exit:
-    """Return the exit code of a run; `raised`: it could not even be begun, or drained."""
+    """Return the exit code of a run; `raised`: the run could not begin, or not drain."""
     if state.unaccounted or (state.abandoned and state.finished is None):
         return Exit.UNKNOWN
     if state.stop is not None:

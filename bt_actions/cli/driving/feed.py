@@ -1,7 +1,7 @@
-"""Feeds the events of a run to its state and its view: the same lines from a run and from a file.
+"""The events of a run, fed to its state and its view: the same lines from a run and from a file.
 
-Time passes for the view up to each event, before the event counts: what is shown because something
-lasts is shown as things stood then, however late the event is read.
+The view's time passes up to each event before the event counts: lines about something that lasts
+show the state of their moment, however late the event is read.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from bt_actions.story.state import State
 from bt_actions.story.words import waiting_text
 
 SOON = 1.0
-"""Seconds after the end of the tree for which nothing is said of goals that have not ended."""
+"""Seconds after the end of the tree without a word about goals that have not ended."""
 
 
 class Feed:
-    """Holds the state of a run, and the view of it."""
+    """The state of a run, and its view."""
 
     def __init__(
         self,
@@ -27,15 +27,15 @@ class Feed:
         view: View,
         show: Callable[[Callable[[], None]], None] = lambda draw: draw(),
     ) -> None:
-        """`show` is given each call of the view, to guard it."""
+        """Take state and view; `show` makes each call of the view, to guard it."""
         self.state, self.view, self._show = state, view, show
         self._waits_since: float | None = None
-        """When the tree was first known to have ended."""
+        """The moment at which the tree was first known to have ended."""
         self._has_said = False
-        """Whether it was said what is waited for."""
+        """Whether the open goals were told."""
 
     def event(self, event: Event) -> None:
-        """Take in an event, and show it, unless its node is not known: it is damaged, or late."""
+        """Take in an event, and show it; drop an event of an unknown node, damaged or late."""
         self._pass(event.at.steady)
         self.state.fold(event)
         node = getattr(event, "node", None)
@@ -43,7 +43,7 @@ class Feed:
             self._show(partial(self.view.event, event))
 
     def frame(self, now: float) -> None:
-        """Show how things stand at `now`, on the steady clock."""
+        """Show the state at `now`, on the steady clock."""
         self._pass(now)
         self._show(partial(self.view.frame, now))
 

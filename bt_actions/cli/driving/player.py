@@ -1,6 +1,6 @@
-"""A recording that is played: at which moment it stands, how fast it goes on, what each key does.
+"""The player of a recording: its moment, its speed, the meaning of each key.
 
-Reads no clock and no key, and draws nothing: time that passes, and keys, are told.
+Reads no clock and no key, and draws nothing: callers give passed time and keys.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from bt_actions.story.state import State
 
 SPEEDS = (1.0, 2.0, 5.0, 10.0, 100.0)
 STEPS = {"left": -5.0, "right": 5.0, "down": -60.0, "up": 60.0}
-"""Seconds by key."""
+"""The seconds of each key."""
 
 
 class Player:
-    """Where a tape is played; it stops at its end."""
+    """A tape with a moment, which stops at its end."""
 
     def __init__(self, tape: Tape, speed: float = 1.0) -> None:
         """Begin with the run; `speed` is in seconds of the run for one of the user's."""
         self._tape = tape
         self.first, self.last = tape.end.started, tape.times[-1]
-        """When the run began, and when the recording ends, on the steady clock."""
+        """The begin of the run and the end of the recording, on the steady clock."""
         self.speed, self.is_paused = speed, False
         self.said = ""
         """Why the latest key did nothing, or ""."""
@@ -30,17 +30,17 @@ class Player:
 
     @property
     def state(self) -> State:
-        """How the run stands now; to be read until the next call."""
+        """The state of the run at this moment; to be read until the next call."""
         return self._tape.seek(self._position)
 
     def let_pass(self, seconds: float) -> None:
-        """Let so much of the user's time pass."""
+        """Let seconds of the user's time pass."""
         if not self.is_paused:
             self._go(self.now + seconds * self.speed)
             self.is_paused = self.now >= self.last
 
     def press(self, key: str) -> None:
-        """Do what a key is for; a key that is for nothing does nothing."""
+        """Do what a key means; ignore a key without a meaning."""
         self.said = ""
         if key == " ":
             if self.now >= self.last:  # from the beginning, as players do
@@ -71,6 +71,6 @@ class Player:
         self._position = self._tape.after(self.now)
 
     def _stop_at(self, position: int) -> None:
-        """Stop behind an event, where others of that moment may follow."""
+        """Stop behind an event, where others of the same moment may follow."""
         self._position = min(max(position, self._tape.after(self.first)), len(self._tape))
         self.now, self.is_paused = self._tape.times[self._position - 1], True

@@ -1,4 +1,4 @@
-"""Whether a command records its runs, as its options and the environment say."""
+"""The choice to record a command's runs, by its options and the environment."""
 
 from __future__ import annotations
 
@@ -39,7 +39,10 @@ def add_options(parser: argparse.ArgumentParser, *, one_run: bool) -> None:
 def recorder(
     args: argparse.Namespace, say: Callable[[str], None] = lambda text: note(f"bt-actions: {text}")
 ) -> Recorder:
-    """Return what records the command's runs, or tells that they are not; raises BadInput."""
+    """Return the recorder of the command's runs, or one that says that none is kept.
+
+    Raises BadInput.
+    """
     how = os.environ.get(VARIABLE) or "all"
     if how not in _WORDS:
         raise BadInput(f"{VARIABLE} is {how!r}; it is one of {', '.join(_WORDS)}")

@@ -1,4 +1,4 @@
-"""Recorded runs for the commands that read them: which one is meant, and how far reading is."""
+"""Recorded runs for the commands that read them: the choice of a run, the progress of reading."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ if TYPE_CHECKING:
     from bt_actions.recording.reading import Recording
 
 RUN = "first letters of an id, name of a tree, .mcap file, or folder of a bag"
-"""What RUN may be, for help."""
+"""The forms of RUN, for help."""
 _SOON = 0.5
-"""Seconds for which a user wonders about nothing."""
+"""Seconds that a user does not notice."""
 
 
 @contextlib.contextmanager
 def reading(run: str) -> Iterator[Recording]:
-    """Yield the recording that `run` means, the last of all if "", which nobody removes meanwhile.
+    """Yield the recording that `run` means, the last of all for "", kept from removal meanwhile.
 
-    Raises BadInput, also for what cannot be read within.
+    Raises BadInput, also for errors of reading within.
     """
     from bt_actions.recording.folders import NoRun, find, held
     from bt_actions.recording.reading import Recording, RecordingError
@@ -43,7 +43,7 @@ def reading(run: str) -> Iterator[Recording]:
 
 
 def _finish(first: Path) -> None:
-    """Finish a recording of ours that a killed process left, and no bag of others."""
+    """Finish a recording of ours that a killed process left; leave others' bags alone."""
     from bt_actions.recording.finishing import finish
     from bt_actions.recording.folders import read_summary
 
@@ -54,7 +54,7 @@ def _finish(first: Path) -> None:
 
 @contextlib.contextmanager
 def progress(what: str) -> Iterator[Callable[[int], None]]:
-    """Yield what takes a count and shows it on standard error, where that is a terminal.
+    """Yield a function that shows a count on standard error, where that is a terminal.
 
     Nothing is shown before half a second has passed, and nothing stays.
     """

@@ -1,7 +1,7 @@
-"""A server on a node of its own, from its start to its end: until a signal, or its executor dies.
+"""A server on a node of its own, from its start to its end by a signal or a dead executor.
 
-The order of the end: the server answers whom it serves and goes, nothing spins any more, then node
-and context go. Knows nothing of what is served.
+The order of the end: the server answers its clients and closes, the executor stops, then node and
+context go. Knows nothing of the server's purpose.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from bt_actions.utilities.shorten import fit
 
 
 class Served(Protocol):
-    """What is served."""
+    """A server."""
 
     def close(self) -> None:
-        """Be gone, while the node is spun."""
+        """Close, while the executor spins the node."""
 
 
 AnyServed = TypeVar("AnyServed", bound=Served)
@@ -40,8 +40,8 @@ def serve(
 ) -> Exit:
     """Serve what `make` makes of a node called `name`; return the exit code. Main thread only.
 
-    `announce` and `close` are called while the node is spun, and `conclude` at the end, with the
-    exit code so far; it returns what that is to be.
+    `announce` and `close` are called while the node spins. `conclude` is called at the end with
+    the exit code so far, and returns the final one.
     """
     with importing_ros():
         from bt_actions.ros.spinning import Spinner
@@ -68,6 +68,6 @@ def serve(
 
 
 def say(text: str) -> None:
-    """Print a line at once, whether or not anybody reads it."""
+    """Print a line at once, with or without a reader."""
     with contextlib.suppress(OSError, ValueError):
         print(fit(text), flush=True)

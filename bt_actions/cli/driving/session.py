@@ -1,7 +1,7 @@
-"""One run with all that belongs to it: runner, simulation, signals, view, and the order of closing.
+"""One run with all its parts: runner, simulation, signals, view, and the order of closing.
 
-The order: the tree ends and its goals are drained (runner), the simulated servers go, then node
-and context. It happens on the tree's thread, so that the main thread can still be told to leave.
+The order: the tree ends and its goals are drained (runner), the simulated servers close, then node
+and context. The tree's thread closes, so that the main thread can still hear a signal to leave.
 """
 
 from __future__ import annotations
@@ -41,12 +41,14 @@ if TYPE_CHECKING:
 
 Json = TypeVar("Json", bound=JsonView)
 PART_TOLERANCE = 0.05
-"""How far from --check-part the part may lie, in metres: the size of a simulated station."""
+"""Metres between the part and the place of --check-part that still count as there: the size of a
+simulated station.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class SimulationWish:
-    """What --sim or --sim-like and its companions ask for."""
+    """The wish behind --sim or --sim-like and their companions."""
 
     speed: float = 1.0
     faults: Sequence[Fault] = ()
@@ -56,7 +58,7 @@ class SimulationWish:
 
 
 class Session:
-    """Holds what one run needs, from construction to `__exit__`; main thread only."""
+    """The parts of one run, from construction to `__exit__`; main thread only."""
 
     def __init__(
         self,
@@ -70,11 +72,12 @@ class Session:
         recorder: Recorder | None = None,
         publish_values: bool | None = None,
     ) -> None:
-        """`outlook` is where the node is made, called `name`; it is the session's to close.
+        """Make the node, called `name`, in `outlook`, which the session closes.
 
         `recorder` records the run. With `publish_values` given, the node has the run's topics.
 
-        Raises BadInput when ROS is not there or cannot start, or a fault fits no server."""
+        Raises BadInput where ROS is missing or cannot start, or a fault fits no server.
+        """
         with importing_ros():
             import bt_actions.ros.spinning  # noqa: F401 - the runner imports it late
         from bt_actions.running.runner import TreeRunner as Runner
@@ -126,7 +129,7 @@ class Session:
             logging.getLogger("bt_actions").removeFilter(_is_news)
 
     def view(self, *, as_json: bool = False, plain: bool = False, verbose: bool = False) -> View:
-        """Return the view that suits standard output: lines if `plain`; `verbose` is about them."""
+        """Return the view for standard output: lines if `plain`; `verbose` adds lines."""
         if as_json:
             return self.json_view(JsonView)
         if sys.stdout.isatty() and not plain:
@@ -140,7 +143,7 @@ class Session:
         return LineView(self.state, sys.stdout, verbose=verbose)
 
     def json_view(self, kind: type[Json]) -> Json:
-        """Return a view for programs, which are told of lines that they were too slow for."""
+        """Return a view for programs, which hears of lines lost to a slow reader."""
         self._output.tell_gaps(_gap_object)
         return kind(self.state, results())
 
@@ -152,7 +155,7 @@ class Session:
         part_at: float | None = None,
         judge: Judge = lambda code: (code, ""),
     ) -> Exit:
-        """Run to the end, show it all, return the exit code; does not return when abandoned."""
+        """Run to the end, show it all, return the exit code; an abandoned run never returns."""
         try:
             if view.fileno < 0:  # else the view reads standard error itself
                 self._output.catch_stderr()
@@ -198,7 +201,7 @@ class Session:
             self._runner.shutdown()
 
     def _world(self, part_at: float | None) -> tuple[str, str]:
-        """Return what the simulated world looks like, and what is not as it should be."""
+        """Return the simulated world in words, and what is wrong with it."""
         if self._simulator is None or not self._simulator.said:
             return "", ""
         wrong = [
@@ -215,14 +218,14 @@ class Session:
 
 
 class _Simulator:
-    """Simulated servers on a node of their own, in the executor that the tree's node is in too."""
+    """Simulated servers on a node of their own, in the executor of the tree's node."""
 
     def __init__(
         self, runner: TreeRunner, root: Behaviour, robots: Wanted, wish: SimulationWish
     ) -> None:
-        """Bring the servers up before anything spins.
+        """Open the servers before anything spins.
 
-        Raises BadInput when a fault fits none of the servers, or no run can be read.
+        Raises BadInput for a fault that fits no server, or a run that cannot be read.
         """
         from bt_actions.ros.spinning import node_beside
         from bt_actions.simulation import FaultError
@@ -230,7 +233,7 @@ class _Simulator:
         self._namespaces = robots.namespaces
         self._node = node_beside(runner.node, "simulation")
         self.parts: dict[str, Part] = {}
-        """By namespace, as they were when the run was over; empty before."""
+        """The parts by namespace, as the run's end left them; empty before."""
         self.said = ""
         self._simulation: Simulation | RecordedServers | None = None
         runner.on_close(self._close)
@@ -242,7 +245,7 @@ class _Simulator:
         by_chance = any(each.probability < 1.0 for each in wish.faults)
         seed = [f"--seed {self._simulation.seed}"] if by_chance else []
         self.options = " ".join([what, f"--speed {wish.speed:g}", *faults, *seed])
-        """What stands in for the world, in the words of the command line."""
+        """The stand-in for the world, in the words of the command line."""
         runner.executor.add_node(self._node)
 
     def _serve(
@@ -267,7 +270,7 @@ class _Simulator:
         return servers, f"--sim-like {servers.run.began.run_id}"
 
     def _close(self) -> None:
-        """Take note of the world and destroy it all."""
+        """Take note of the world, then destroy it."""
         simulation = self._simulation
         if simulation is not None:
             if hasattr(simulation, "world"):
@@ -278,7 +281,7 @@ class _Simulator:
 
 
 def _is_news(record: logging.LogRecord) -> bool:
-    """Whether the view does not tell it: which goals are not accounted for, it does at the end."""
+    """Return whether a log line is news to the view, which lists open goals itself at the end."""
     return "accounted for" not in record.getMessage()
 
 

@@ -1,9 +1,9 @@
 """SIGINT, SIGTERM, SIGHUP and SIGQUIT as bytes in a pipe, which the main thread reads in its time.
 
 A handler that did more than write a byte could run in the middle of anything, with any lock held.
-So the main thread only waits here, and all work is done on others; a library, whose main thread may
-be the one that works, has ros/signals.py. Nothing here decides what a signal means, only when a
-second one is the first.
+So the main thread only waits, and other threads do all work. A library, whose main thread may work
+itself, has ros/signals.py. This file decides only when a second signal counts as the first; the
+meaning of a signal is decided elsewhere.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ _ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 _MAY_BE_IGNORED = (signal.SIGHUP, signal.SIGQUIT)
 
 SAME_WISH = 0.25
-"""A second signal within so many seconds is the first one, passed on by a wrapper (uv, a shell)."""
+"""Seconds in which a second signal is the first one, passed on by a wrapper (uv, a shell)."""
 _to_ignore: set[signal.Signals] = set()
 
 
 @atexit.register
 def _ignore() -> None:
-    """What is settled holds while Python takes itself down, too, where it has no handlers."""
+    """Ignore all signals: the exit code stands while Python shuts down without handlers."""
     for number in _to_ignore:
         signal.signal(number, signal.SIG_IGN)
 
 
 class Signals:
-    """Catches the signals that end a program, from `__enter__` to `__exit__`; main thread only.
+    """The catch of signals that end a program, from `__enter__` to `__exit__`; main thread only.
 
-    SIGHUP and SIGQUIT stay ignored where the program was started so (nohup, a shell's &).
+    SIGHUP and SIGQUIT stay ignored in a program that was started so (nohup, a shell's &).
     """
 
     def __init__(self) -> None:
@@ -73,14 +73,14 @@ class Signals:
             os.close(self._write)
 
     def settle(self, code: int) -> None:
-        """It is told how this program ends: from here on a signal ends it at once, and as told."""
+        """Fix the exit code: from here on a signal ends the program at once, with that code."""
         self._settled = True
         for number in self._before:
             signal.signal(number, lambda _number, _frame: os._exit(code))
         _to_ignore.update(self._before)
 
     def poke(self) -> None:
-        """Wake the thread that waits; callable from any thread."""
+        """Wake the waiting thread; callable from any thread."""
         with self._closing, contextlib.suppress(BlockingIOError):  # full: it will wake anyway
             if not self._closed:
                 os.write(self._write, b"\0")
@@ -100,8 +100,8 @@ class Signals:
     ) -> tuple[list[signal.Signals], set[int]]:
         """Wait for a signal, for a poke, until `readable` has data or `writable` lost its reader.
 
-        Return the signals since the last call, and which of the two descriptors have something to
-        tell; -1 is none. `timeout` is in seconds; None waits without limit.
+        Return the signals since the last call, and which of the two descriptors are ready; -1 is
+        none. `timeout` is in seconds; None waits without limit.
         """
         poll = select.poll()
         poll.register(self._read, select.POLLIN)
@@ -126,4 +126,4 @@ class Signals:
 
 
 def _only_the_byte(_number: int, _frame: FrameType | None) -> None:
-    """Python's C handler has written the byte to the pipe by now."""
+    """Do nothing: Python's C handler has written the byte to the pipe by now."""

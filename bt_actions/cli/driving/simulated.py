@@ -1,6 +1,6 @@
-"""Which simulated robots a tree needs: the namespaces of its own MoveRobot and Gripper leaves.
+"""The simulated robots of a tree: the namespaces of its own MoveRobot and Gripper leaves.
 
-Reads a tree that is not set up yet; starts nothing and imports no ROS.
+Reads a tree before its setup; starts nothing and imports no ROS.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ if TYPE_CHECKING:
     from py_trees.behaviour import Behaviour
 
 SERVED = {"MoveRobot": "move_robot", "Gripper": "gripper_control"}
-"""What a simulated robot serves: names by types."""
+"""The servers of a simulated robot: names by types."""
 _PACKAGE = "robot_control_interfaces"
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What a tree wants of a simulation."""
+    """A tree's needs of a simulation."""
 
     namespaces: Sequence[str]
-    """Of the robots; "/" is the root. Never empty."""
+    """The namespaces of the robots; "/" is the root. Never empty."""
     others: Sequence[str]
-    """The servers that no simulated robot has, as `name (type)`,"""
+    """The action servers that no simulated robot has, as `name (type)`."""
     services: Sequence[str] = ()
-    """and those of services among them."""
+    """The service servers that no simulated robot has."""
 
 
 def wanted(root: Behaviour, namespace: str = "") -> Wanted:
-    """Return what `root` wants when it runs on a node in `namespace` ("" or with a slash)."""
+    """Return the needs of `root` on a node in `namespace` ("" or with a slash)."""
     from bt_actions.behaviours.places import in_order
 
     namespaces: dict[str, None] = {}
@@ -54,7 +54,7 @@ def wanted(root: Behaviour, namespace: str = "") -> Wanted:
 
 
 def remark(found: Wanted, *, recorded: bool = False) -> str:
-    """Say in one line which servers must come from elsewhere; empty when none.
+    """Say in one line which servers must come from elsewhere; "" for none.
 
     `recorded`: the actions are served as in a recorded run.
     """

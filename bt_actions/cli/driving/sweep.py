@@ -1,4 +1,4 @@
-"""A cleanup as the user sees it: what is found, how it ends, what is not known, and signals."""
+"""A cleanup on the terminal: the found goals, their ends, open questions, and signals."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def sweep(
     accept: float = 0.0,
     first: str = "",
 ) -> Exit:
-    """Clean up, saying what is found and how it ended; `first`: another run is to follow,
-    and this is what to do where that is not wanted.
+    """Clean up, and tell the found goals and their ends.
 
-    Where not every server of one of the `wanted` actions, which are full names, answers, or none of
-    any action is in sight, and nobody says which are wanted, nobody can say: UNKNOWN. Main thread
-    only. The first signal has the cleanup end in good order, and a second one does not wait.
+    `first` says that another run is to follow, and what to do where that is not wanted. UNKNOWN is
+    the code where a server of one of the `wanted` actions (full names) does not answer; without
+    `wanted`, where no server of any action is in sight. Main thread only. The first signal ends the
+    cleanup in good order, and a second one does not wait.
     """
     heard: list[signal.Signals] = []
     found: list[LeftBehind] = []
@@ -68,7 +68,7 @@ def _sweep(
     found: list[LeftBehind],
     stopped: Callable[[], bool],
 ) -> Swept:
-    """Look, and cancel; return what was seen, and say meanwhile what is `found`."""
+    """Look for goals, and cancel them; tell those in `found`, and return what was seen."""
     with importing_ros():
         from bt_actions.recovery.sweep import Cleanup
 
@@ -102,7 +102,7 @@ def _sweep(
 
 
 def _tell(swept: Swept, code: Exit, say: Callable[[str], object]) -> None:
-    """Say what became of each goal, or that nothing was left."""
+    """Tell the end of each goal, or that no goal was left."""
     try:
         for goal in swept.left:
             say(_line(goal))
@@ -117,7 +117,7 @@ def _tell(swept: Swept, code: Exit, say: Callable[[str], object]) -> None:
 def _tell_what_is_open(
     swept: Swept, stopped_by: signal.Signals | None, hint: str, any_will_do: bool
 ) -> Exit:
-    """Say what is not known, which may be something to wait for; return the exit code."""
+    """Tell the open questions, which may be worth a wait; return the exit code."""
     code = Exit.SUCCESS
     if swept.elsewhere:
         goals = (f"{goal_id.hex()} on {action}" for goal_id, action in swept.elsewhere.items())

@@ -1,4 +1,4 @@
-"""The page beside a command: `--view` has this user's view show what the command records."""
+"""The page beside a command: with `--view` this user's view shows the runs of the command."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def add_option(parser: argparse.ArgumentParser) -> None:
 
 
 def need_page() -> None:
-    """Raise BadInput where what serves the page is not installed."""
+    """Raise BadInput where the page's server is not installed."""
     for name in ("starlette", "uvicorn"):
         if importlib.util.find_spec(name) is None:
             remedy = "pip install 'bt_actions[view]'"
@@ -30,7 +30,7 @@ def need_page() -> None:
 
 
 def show(args: argparse.Namespace, shown: str = "") -> None:
-    """Print where the page is, if that is wanted; raise BadInput where it cannot be had."""
+    """Print the page's address where that is wanted; raise BadInput where there is no page."""
     if not args.view:
         return
     if args.no_record or args.record is not None or os.environ.get(VARIABLE) == "off":

@@ -1,1 +1,1 @@
-"""Where text goes: standard output and standard error, whatever their readers do."""
+"""Standard output and standard error, with readers of any kind."""

@@ -1,4 +1,4 @@
-"""Keys that a user presses in the terminal on standard input: one by one, and not shown."""
+"""The keys of the terminal on standard input: one by one, and not shown."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Keys:
     """Takes keys from `__enter__` to `__exit__`; Ctrl-C is a signal as ever, Ctrl-Z a key."""
 
     def __init__(self, fileno: int) -> None:
-        """`fileno` is a terminal's."""
+        """Take the descriptor of a terminal."""
         self.fileno = fileno
 
     def __enter__(self) -> Self:
@@ -33,7 +33,7 @@ class Keys:
             termios.tcsetattr(self.fileno, termios.TCSAFLUSH, self._before)
 
     def read(self) -> list[str]:
-        """Return the keys that were pressed; arrows as `up`, `down`, `left`, `right`.
+        """Return the pressed keys; arrows as `up`, `down`, `left`, `right`.
 
         Raises OSError or EOFError where the terminal is gone.
         """

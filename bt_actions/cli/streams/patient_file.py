@@ -1,9 +1,9 @@
-"""A file that takes text at once and writes it with a thread of its own; a reader takes its time.
+"""A file that takes text at once, while a thread of its own writes in the reader's time.
 
-Whoever reads may pause (`less`, Ctrl-S, a stuck collector of logs), and what is written waits here,
-in order and bounded; a file on a disk has no reader, and gets everything. Must not decide what a
-failed write means: the main thread's next write or flush raises it. Must not hold a lock of
-Python's own streams while it writes: the interpreter could not exit then.
+A reader may pause (`less`, Ctrl-S, a stuck collector of logs): the text then waits here, in order
+and bounded. A file on a disk has no reader, and gets everything. This file must not decide what a
+failed write means: the main thread's next write or flush raises the error. The thread must not
+hold a lock of Python's own streams while it writes: the interpreter could not exit then.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 MOST = 4_000_000
 """Bytes that may wait for a reader; beyond that the oldest are dropped."""
 _OF_A_PIECE = 64
-"""Bytes that a piece of text costs besides its own."""
+"""Bytes of overhead for each piece of text."""
 _OF_A_LARGE_ONE = 4
-"""Large pieces that may wait, however large: none alone drops what is around it, or is dropped."""
+"""Large pieces that may wait, of any size: one alone neither drops others nor is dropped."""
 
 
 def has_reader(descriptor: int) -> bool:
-    """Whether somebody reads what is written there, who may pause."""
+    """Return whether a descriptor has a reader, which may pause."""
     mode = os.fstat(descriptor).st_mode
     return stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode) or os.isatty(descriptor)
 
@@ -39,7 +39,7 @@ def _cost(piece: bytes) -> int:
 
 
 def gap_text(lines: int) -> str:
-    """Say in a line that some are missing."""
+    """Say in a line that some lines are missing."""
     return f"... {lines} lines are missing here: they were not read in time\n"
 
 
@@ -62,19 +62,19 @@ class PatientFile(io.RawIOBase):
         self._thread.start()
 
     def writable(self) -> bool:
-        """It is."""
+        """Return True: the file takes text."""
         return True
 
     def fileno(self) -> int:
-        """Return the descriptor that is written to in the end."""
+        """Return the descriptor that the thread writes to."""
         return self._descriptor
 
     def isatty(self) -> bool:
-        """Whether that is a terminal."""
+        """Return whether the descriptor is a terminal's."""
         return os.isatty(self._descriptor)
 
     def write(self, data: ReadableBuffer, /) -> int:
-        """Let `data` be written; raises as `flush` does."""
+        """Queue `data`; raises as `flush` does."""
         self.flush()
         if not (piece := bytes(data)):
             return 0
@@ -91,9 +91,9 @@ class PatientFile(io.RawIOBase):
         return len(piece)
 
     def flush(self) -> None:
-        """Wait for nothing; raise, once, what became of an earlier write.
+        """Raise, once, the error of an earlier write; wait for nothing.
 
-        In the main thread only: a leaf that prints must not fail for it.
+        The main thread alone gets the error: a leaf that prints must not fail for it.
         """
         if self._forked or threading.current_thread() is not threading.main_thread():
             return
@@ -104,11 +104,11 @@ class PatientFile(io.RawIOBase):
 
     @property
     def _forked(self) -> bool:
-        """Whether this is a copy in a child process, without the thread that writes."""
+        """Whether this is a copy in a child process, without the writing thread."""
         return os.getpid() != self._pid
 
     def written(self, within: float) -> bool:
-        """Whether all is written, now or in so many seconds; raises as `flush` does."""
+        """Return whether all is written, now or within so many seconds; raises as `flush` does."""
         with self._changed:
             done = self._changed.wait_for(
                 lambda: self._error or not (self._waiting or self._writing), within
@@ -117,7 +117,7 @@ class PatientFile(io.RawIOBase):
         return bool(done)
 
     def end(self) -> None:
-        """Let the thread end when all is written; what is never read is lost with the process."""
+        """Let the thread end once all is written; unread text is lost with the process."""
         with self._changed:
             self._ended = True
             self._changed.notify_all()
@@ -137,7 +137,7 @@ class PatientFile(io.RawIOBase):
                 self._changed.notify_all()
 
     def _next(self) -> bytes:
-        """Wait for a piece, and take it; empty at the end."""
+        """Wait for a piece, and take it; b"" at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._waiting or self._ended)
             if not self._waiting:

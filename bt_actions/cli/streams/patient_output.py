@@ -1,8 +1,8 @@
-"""Standard output and error for the length of a run: whatever their readers do, no thread waits.
+"""Standard output and error for the length of a run: no thread waits, whatever their readers do.
 
-The main thread enforces --timeout and reads the signals, and rclpy logs with the GIL held: a pipe
-that is full would stop all of it, and the robot would move on. Must not wait for a reader itself:
-`written` tells how far they are, and drive.py decides how long to wait.
+The main thread enforces --timeout and reads the signals, and rclpy logs with the GIL held: a full
+pipe would stop all of this, and the robot would move on. This file must not wait for a reader
+itself: `written` tells the progress of the readers, and drive.py decides how long to wait.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from bt_actions.cli.streams.stderr import roomy_pipe
 
 
 class PatientOutput:
-    """Stands in the place of standard output from `__enter__` to `__exit__`; main thread only."""
+    """A stand-in for standard output, from `__enter__` to `__exit__`; main thread only."""
 
     def __init__(self) -> None:
         self._stdout = results()
@@ -47,19 +47,19 @@ class PatientOutput:
             self._file.end()
 
     def catch_stderr(self) -> None:
-        """Let standard error be patient, too, where it has a reader who could pause."""
+        """Make standard error patient, too, where it has a reader that could pause."""
         if has_reader(STDERR):
             self._stderr = _PatientStderr()
 
     def tell_gaps(self, gap: Callable[[int], str]) -> None:
-        """Let `gap` say in what is written to standard output how many lines are missing."""
+        """Let `gap` say in the output how many lines are missing."""
         if self._file is not None:
             self._file.gap = gap
 
     def written(self, within: float) -> bool:
-        """Whether all is written, now or in so many seconds.
+        """Return whether all is written, now or within so many seconds.
 
-        Raises what became of an earlier write to standard output.
+        Raises the error of an earlier write to standard output.
         """
         done = self._file is None or self._file.written(within)
         if self._stderr is not None:
@@ -68,7 +68,7 @@ class PatientOutput:
 
 
 def _text(file: PatientFile, like: TextIO, *, write_through: bool = False) -> TextIO:
-    """Return a stream that encodes as `like` does; it writes line by line, or at once."""
+    """Return a stream with the encoding of `like`, which writes line by line, or at once."""
     return io.TextIOWrapper(
         file,  # type: ignore[type-var]  # a raw stream has all that is needed
         encoding=like.encoding,
@@ -82,7 +82,8 @@ def _text(file: PatientFile, like: TextIO, *, write_through: bool = False) -> Te
 class _PatientStderr:
     """File descriptor 2, led into a pipe that never blocks: C libraries write there, too.
 
-    So is 1 where that is standard error for all but results, and a print of any length has room.
+    Descriptor 1 follows where that is standard error for all but results, and a print of any length
+    has room.
     """
 
     def __init__(self) -> None:
@@ -111,13 +112,13 @@ class _PatientStderr:
         os.close(self._read)
 
     def _has_text(self, *, wait: bool = False) -> bool:
-        """Whether there is text in the pipe, or all who could write have closed it."""
+        """Return whether the pipe has text, or has lost all its writers."""
         poll = select.poll()  # one for each thread
         poll.register(self._read, select.POLLIN)
         return bool(poll.poll(None if wait else 0))
 
     def written(self, within: float) -> bool:
-        """Whether all is written, now or in so many seconds; nobody is told of what is lost."""
+        """Return whether all is written, now or within so many seconds; lost text is no error."""
         with self._moving:
             if self._has_text():
                 return False
@@ -126,7 +127,7 @@ class _PatientStderr:
         return True
 
     def close(self) -> None:
-        """Let 2 be what it was; what was written before is on its way."""
+        """Restore descriptor 2; earlier text is on its way."""
         with contextlib.suppress(OSError, ValueError):
             sys.stderr.flush()
         if STDOUT in self._descriptors:

@@ -1,6 +1,6 @@
-"""Where the results of a command go: standard output, or what is kept of it for results alone.
+"""The stream for the results of a command: standard output, or a copy of it for results alone.
 
-A tree's own classes run beside some commands. What they print, and what a logger, a C library or a
+A tree's own classes run beside some commands. Their prints, and whatever a logger, a C library or a
 child process writes to standard output, must not stand between results that a program reads.
 """
 
@@ -16,28 +16,28 @@ STDOUT, STDERR = 1, 2
 
 @dataclass(slots=True)
 class _Apart:
-    """Standard output is standard error for all others."""
+    """The state in which standard output is standard error for all but results."""
 
     results: TextIO
     stdout: TextIO
-    """What sys.stdout was before."""
+    """The former sys.stdout."""
 
 
 _apart: _Apart | None = None
 
 
 def results() -> TextIO:
-    """Return the stream that results are written to."""
+    """Return the stream for results."""
     return sys.stdout if _apart is None else _apart.results
 
 
 def are_apart() -> bool:
-    """Whether standard output, for all others, is standard error."""
+    """Return whether standard output is standard error for all but results."""
     return _apart is not None
 
 
 def send_results(stream: TextIO) -> None:
-    """Let `stream` take the results from here on."""
+    """Send the results to `stream` from here on."""
     if _apart is None:
         sys.stdout = stream
     else:
@@ -45,10 +45,10 @@ def send_results(stream: TextIO) -> None:
 
 
 def keep_results_apart() -> None:
-    """Give standard output to results alone; what others write there is on standard error.
+    """Give standard output to results alone; all other output goes to standard error.
 
-    To be called before a class of the user's is imported. It is so to the very end of the process,
-    exit hooks included. Main thread only.
+    Call this before the import of a class of the user's. The state lasts to the very end of the
+    process, exit hooks included. Main thread only.
     """
     global _apart
     stdout = kept = sys.stdout
@@ -65,7 +65,7 @@ def keep_results_apart() -> None:
 
 
 def give_stdout_back() -> None:
-    """Undo `keep_results_apart`, where a program has called a command and goes on."""
+    """Undo `keep_results_apart`, for a program that has called a command and goes on."""
     global _apart
     if _apart is None:
         return
@@ -77,7 +77,7 @@ def give_stdout_back() -> None:
 
 
 def _is_descriptor(stdout: TextIO) -> bool:
-    """Whether a stream is the process's own, and no test's."""
+    """Return whether a stream is the process's own, and no test's."""
     try:
         return stdout.fileno() == STDOUT
     except (OSError, ValueError):

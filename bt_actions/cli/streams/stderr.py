@@ -1,4 +1,4 @@
-"""Standard error, caught while a terminal is drawn on: what C libraries write there, too.
+"""Standard error, caught while a terminal is drawn on: the lines of C libraries, too.
 
 Drawing and lines from elsewhere on one terminal would overwrite each other.
 """
@@ -11,13 +11,14 @@ import os
 import sys
 
 _ROOM = 1 << 20
-"""Bytes that may come in before a thread of ours takes them."""
+"""Bytes of room before a thread of ours takes them."""
 
 
 def roomy_pipe() -> tuple[int, int]:
-    """Return a pipe whose writers never wait: what does not go in is lost.
+    """Return a pipe whose writers never wait: bytes beyond its room are lost.
 
-    rclpy logs with the GIL held. It would wait for a thread of ours, and that thread for the GIL.
+    rclpy logs with the GIL held. A full pipe would make it wait for a thread of ours, and that
+    thread for the GIL.
     """
     read, write = os.pipe()
     with contextlib.suppress(OSError):  # more than an unprivileged user may have
@@ -27,7 +28,7 @@ def roomy_pipe() -> tuple[int, int]:
 
 
 class CaughtStderr:
-    """File descriptor 2 led into a pipe while the terminal is drawn on, if 2 is that terminal."""
+    """File descriptor 2, led into a pipe while the terminal is drawn on, if 2 is that terminal."""
 
     def __init__(self) -> None:
         self.fileno = -1
@@ -59,7 +60,7 @@ class CaughtStderr:
         return [line.decode(errors="replace").rstrip("\r") for line in whole]
 
     def close(self) -> None:
-        """Give file descriptor 2 back; `lines` still returns what was written before."""
+        """Restore descriptor 2; `lines` still returns earlier lines."""
         if self._saved >= 0:
             sys.stderr.flush()
             os.dup2(self._saved, 2)

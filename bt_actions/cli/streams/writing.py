@@ -1,4 +1,4 @@
-"""Words for standard output and standard error, whoever may still be reading there."""
+"""Words for standard output and standard error, with readers of any kind."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from bt_actions.utilities.shorten import fit
 
 
 class OutputLost(Exception):
-    """Standard output cannot be written, for another reason than that nobody reads it."""
+    """Standard output that cannot be written, though it has a reader."""
 
     def __init__(self, error: OSError) -> None:
         super().__init__(f"standard output cannot be written: {error.strerror or error}")
@@ -21,7 +21,7 @@ class OutputLost(Exception):
 def write(text: str) -> None:
     """Write `text` to standard output, at once.
 
-    Raises OutputLost, or BrokenPipeError when nobody reads any more.
+    Raises OutputLost, or BrokenPipeError without a reader.
     """
     try:
         results().write(text)
@@ -33,12 +33,12 @@ def write(text: str) -> None:
 
 
 def discard_stdout() -> None:
-    """Write to nowhere from now on, what is left in the buffer too."""
+    """Drop all output from now on, with the rest in the buffer."""
     _discard(results())
 
 
 def _discard(stream: TextIO) -> None:
-    """Without this, Python fails to flush the stream at exit, and makes the exit code 120."""
+    """Drop a stream's output: else Python's flush at exit fails, and makes the exit code 120."""
     with contextlib.suppress(OSError, ValueError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
@@ -46,9 +46,9 @@ def _discard(stream: TextIO) -> None:
 
 
 def note(message: str, end: str = "\n") -> None:
-    """Write one message for the user to standard error, whoever may still be reading it.
+    """Write one message for the user to standard error, with or without a reader.
 
-    Each of its lines is one that a user reads: a long one is written without its middle.
+    A user reads each of its lines: a long line loses its middle.
     """
     try:
         print("\n".join(map(fit, message.split("\n"))), file=sys.stderr, flush=True, end=end)

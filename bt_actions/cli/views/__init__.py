@@ -1,1 +1,1 @@
-"""How a run is shown: as lines, as JSON, drawn live, or as one goal. Only writes."""
+"""The views of a run: as lines, as JSON, drawn live, or as one goal. Only writes."""

@@ -1,4 +1,4 @@
-"""Which nodes of a tree to show where there is not room for all. Draws nothing."""
+"""The choice of nodes to show, where not all have room. Draws nothing."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ def choose(
 ) -> tuple[list[int], int, dict[int, int]]:
     """Return at most `most` lines' worth of nodes in tree order, and how many are left out.
 
-    And for each node that runs the lowest one above it, if not shown, where its branch leaves
-    another one.
+    The third value has, for each running node, the lowest node above it, if not shown, where its
+    branch leaves another one.
 
-    First what runs, then of what holds it that which tells running branches apart, then the rest
-    of what holds it, then what comes next to it, then what is nearest in the tree. One line is
-    kept for saying how many are left out. The cost does not grow with the tree.
+    Running nodes come first. Then, of the nodes above them, those that tell running branches apart,
+    then the others, then the next siblings, then the nearest nodes in the tree. One line is kept
+    for the number of nodes left out. The cost does not grow with the tree.
     """
     if len(nodes) <= most:
         return nodes, 0, {}
@@ -43,7 +43,7 @@ def choose(
 
 
 def _branches(state: State, running: list[int], position: dict[int, int]) -> list[list[int]]:
-    """Return what runs at the tips, in tree order, each with all that holds it, upwards."""
+    """Return the running tips in tree order, each with all nodes above it, upwards."""
     active = set(running)
     tips = [node for node in running if active.isdisjoint(state.nodes[node].children)]
     tips.sort(key=position.__getitem__)
@@ -64,7 +64,7 @@ def _fork_of(chains: list[list[int]]) -> dict[int, int]:
 
 
 def _around(nodes: list[int], at: int, most: int) -> Iterator[int]:
-    """Yield nodes by their distance from place `at`, those after it first."""
+    """Yield nodes by their distance from place `at`, later ones first."""
     for distance in range(1, most):
         if at + distance < len(nodes):
             yield nodes[at + distance]
@@ -73,7 +73,7 @@ def _around(nodes: list[int], at: int, most: int) -> Iterator[int]:
 
 
 def _after(state: State, node: int) -> list[int]:
-    """The siblings that come after a node."""
+    """Return the siblings behind a node."""
     parent = state.nodes[node].node.parent
     if parent is None:
         return []

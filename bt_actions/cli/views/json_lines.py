@@ -38,7 +38,7 @@ KINDS = {
     FeedbackCame: "feedback",
     AttemptEnded: "attempt",
 }
-"""The events of a node that are written, as `event` has them."""
+"""The events of a node that are written, with their names in `event`."""
 
 
 class JsonView(View):
@@ -49,7 +49,7 @@ class JsonView(View):
         self._out = out
 
     def event(self, event: Event) -> None:
-        """Write `event` as an object, where it has a view here."""
+        """Write an event as an object, where objects of its kind are written."""
         match event:
             case RunBegan():
                 self._write(
@@ -111,7 +111,7 @@ class JsonView(View):
         }
 
     def _of_node(self, event: Any) -> None:
-        """Write an event of one node, with all that it has."""
+        """Write an event of one node, with all its values."""
         has = {each.name: plain(getattr(event, each.name)) for each in fields(event)[1:]}
         node = has.pop("node")
         about = {
@@ -150,7 +150,7 @@ class JsonView(View):
 
 
 def action_data(action: ActionStory, now: float) -> dict[str, object]:
-    """Return what became of an action, as it stands at `now` on the steady clock."""
+    """Return the story of an action, as of `now` on the steady clock."""
     return {
         "id": action.node.id,
         "name": action.node.name,
@@ -167,7 +167,7 @@ def action_data(action: ActionStory, now: float) -> dict[str, object]:
 
 
 def plain(value: Value | Mapping[str, Value] | Status) -> Any:
-    """Return a snapshot as JSON says it: bytes as numbers, and of what was cut the beginning."""
+    """Return a snapshot in JSON: bytes as numbers, and the beginning of a cut value."""
     if isinstance(value, Status):
         return value.value
     if isinstance(value, Cut):

@@ -1,4 +1,4 @@
-"""A run as lines, for a pipe; or without a word until its end."""
+"""A run as lines, for a pipe; or silent until its end."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import fit
 
 LASTING = 1.0
-"""Seconds after which a goal that still waits, or is still being canceled, gets a line."""
+"""Seconds after which a waiting goal, or one that is being canceled, gets a line."""
 
 
 class LineView(View):
-    """One line a change of a node, one for a goal under way, and one for an attempt that failed.
+    """A line for each change of a node, each goal under way, and each failed attempt.
 
-    A goal that waits, is sent or is canceled gets a line when that lasts; one whose end comes after
-    its outcome, at its end. What is told of a node is told again in each round of a loop.
+    A goal that waits, is sent or is canceled gets a line when that lasts; a goal whose end comes
+    after its outcome gets a line at its end. Each round of a loop tells its nodes again.
     """
 
     def __init__(self, state: State, out: TextIO, *, verbose: bool = False) -> None:
-        """`verbose` adds a line for every other state of a goal, at once."""
+        """Take the output; `verbose` adds a line for every other state of a goal, at once."""
         self._state = state
         self._out = out
         self._verbose = verbose
         self._nodes: dict[int, Status] = {}
-        """The status that each node's line told."""
+        """The status in each node's last line."""
         self._passing: dict[int, float] = {}
-        """By leaf: since when its goal is in a state that is only told when it lasts."""
+        """The moments since which leaves' goals are in a state that is told only when it lasts."""
 
     def event(self, event: Event) -> None:
-        """Write a line when `event` changes what was written before."""
+        """Write a line where `event` changes an earlier line."""
         match event:
             case RunBegan():
                 self._nodes.clear()
@@ -76,7 +76,7 @@ class LineView(View):
                 self._write(stopping_text(self._state))
 
     def due(self, now: float) -> None:
-        """Write what has lasted long enough."""
+        """Write a line for each state that has lasted long enough."""
         for key, since in list(self._passing.items()):
             if now - since >= LASTING:
                 at, action = self._passing.pop(key) + LASTING, self._state.action(key)
@@ -100,7 +100,7 @@ class LineView(View):
         self._line(event.at.steady, event.status.value, event.node, self._news(story, event))
 
     def _news(self, story: NodeStory, event: NodeChanged) -> str:
-        """Return what a node says that no line has said, of its attempt or of a child."""
+        """Return the news of a node that no line has told, of its attempt or of a child."""
         said = event.message
         if event.status is Status.RUNNING:
             return str(doing(self._state, story, event.at.steady)._replace(since="", tries=""))
@@ -158,7 +158,7 @@ def _which(action: ActionStory, event: GoalChanged | AttemptEnded) -> str:
 
 
 class QuietView(View):
-    """Says nothing until the end."""
+    """Silence until the end."""
 
     def __init__(self, state: State, out: TextIO) -> None:
         self._state = state

@@ -1,8 +1,7 @@
 """The tree, drawn live at the bottom of a terminal, in all of its height but some lines.
 
-Finished work scrolls by once above it. Drawn from the main thread, about ten times a second.
-What the C libraries write to standard error meanwhile is caught and scrolls by too, or it would
-be drawn over.
+Finished work scrolls by once above the drawing. The main thread draws, about ten times a second.
+Lines of C libraries on standard error are caught and scroll by, too: the drawing would hide them.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ _GLYPHS = {
 }
 
 SCROLLS = 8
-"""Lines above the drawing that stay for what scrolls by; of a low terminal, two thirds."""
+"""Lines above the drawing for scrolling text; of a low terminal, two thirds."""
 NARROW = 60
 """Columns below which levels are indented by one space instead of two."""
 BAR = 20
@@ -44,7 +43,7 @@ BAR = 20
 
 
 def suits(console: Console) -> bool:
-    """Whether `console` is a terminal that can be drawn on."""
+    """Return whether `console` is a terminal that can be drawn on."""
     return console.is_terminal and not console.is_dumb_terminal
 
 
@@ -64,10 +63,10 @@ def drawing(console: Console, *, whole: bool = False) -> Live:
 
 
 class LiveView(View):
-    """Draws from the state; `finish` must be called, or the terminal keeps the drawing."""
+    """A drawing of the state; without `finish` the terminal keeps the drawing."""
 
     def __init__(self, state: State, console: Console, *, whole: bool = False) -> None:
-        """`whole` takes the terminal as a whole, and gives back what stood there."""
+        """Take a console; with `whole` the whole terminal, whose former content comes back."""
         self._state = state
         self._console = console
         self._plain = console.options.ascii_only
@@ -84,7 +83,7 @@ class LiveView(View):
 
     @property
     def fileno(self) -> int:
-        """What to wait for besides events: standard error's lines."""
+        """The descriptor of standard error's lines, to wait for beside events."""
         return self._stderr.fileno
 
     def event(self, event: Event) -> None:
@@ -120,7 +119,7 @@ class LiveView(View):
             self._done.discard(event.node)
 
     def frame(self, now: float) -> None:
-        """Draw."""
+        """Draw the state."""
         self._let_by()
         height = self._console.height - 1
         lines = self._lines(now, max(1, height // 3, height - SCROLLS))
@@ -157,7 +156,7 @@ class LiveView(View):
         self._done &= self._position.keys()
 
     def _let_by(self) -> None:
-        """Let what has come together scroll by, in one go: each print draws the rest anew."""
+        """Let the gathered lines scroll by in one go: each print draws the rest anew."""
         self._passing += [Text(line, style="dim") for line in self._stderr.lines()]
         if self._passing:
             lines, self._passing = self._passing, []
@@ -173,7 +172,7 @@ class LiveView(View):
         return Text.assemble(glyph, " ", name, (f"  {said}" if said else "", "dim"))
 
     def _lines(self, now: float, most: int) -> list[Text]:
-        """The progress line, and as many nodes as there is room for: `most` lines in all."""
+        """Return the progress line, and as many nodes as there is room for: `most` lines in all."""
         lines = [self._progress(now)]
         running = [node for node in self._running if node in self._position]
         tree = self._state, self._nodes, self._position
@@ -203,7 +202,7 @@ class LiveView(View):
         return "..." if self._plain else "…"
 
     def _fit(self, text: Text, width: int) -> None:
-        """Cut `text` where it is too long, with an ellipsis at its end."""
+        """Cut `text` to a width, with an ellipsis at its end."""
         if text.cell_len > width:
             text.truncate(max(0, width - len(self._dots)), overflow="crop")
             text.append(self._dots[:width])

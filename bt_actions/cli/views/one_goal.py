@@ -28,7 +28,7 @@ class GoalView(View):
         self._drawn = False
 
     def event(self, event: Event) -> None:
-        """Write where the goal stands, when that has changed."""
+        """Write the state of the goal, where that has changed."""
         if isinstance(event, StopWanted) and not event.abandons:
             self._line(stopping_text(self._state))
         if not isinstance(event, GoalChanged) or event.outcome is not None:
@@ -71,7 +71,7 @@ class GoalView(View):
         return feedback_text(action)
 
     def result_lines(self, action: ActionStory) -> list[str]:
-        """Return what the goal's result says."""
+        """Return the lines of the goal's result."""
         if action.end not in (End.SUCCEEDED, End.ABORTED):
             return []  # only these have a result of their own
         return result_lines(action)

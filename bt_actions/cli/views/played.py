@@ -1,7 +1,7 @@
-"""A recording in the whole of a terminal: what has ended lately, the tree, and the player's line.
+"""A recording in the whole of a terminal: recent ends, the tree, and the player's line.
 
-A frame is made from the state alone, so it is the same however the player came to its moment.
-Leaving gives back what stood in the terminal before.
+A frame depends on the state alone, not on the player's way to its moment. At the end the former
+content of the terminal comes back.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from bt_actions.story.words import last_words
 
 
 class PlayedView(LiveView):
-    """Draws where a player stands."""
+    """A drawing of a player's moment."""
 
     def __init__(self, console: Console) -> None:
         super().__init__(State(), console, whole=True)
         self._drawn: list[Text] = []
 
     def show(self, player: Player) -> None:
-        """Draw, where that changes anything."""
+        """Draw, where the picture changes."""
         state = self._state = player.state
         self._index()
         self._running = {key for key, each in state.nodes.items() if each.status is Status.RUNNING}
@@ -53,7 +53,7 @@ class PlayedView(LiveView):
             self._live.update(Text("\n").join(lines), refresh=True)
 
     def _line_of(self, player: Player) -> Text:
-        """Where the player stands, its speed, and as much of its keys as there is room for."""
+        """Return the player's moment, its speed, and as many of its keys as there is room for."""
         length = player.last - player.first
         share = (player.now - player.first) / length if length > 0.0 else 1.0
         full, empty, times = ("=", "-", "x") if self._plain else ("━", "─", "×")

@@ -1,4 +1,4 @@
-"""A run at a server of trees, shown as if it were here; and why the server rejected it."""
+"""A run at a server of trees, shown like a run here; and the reason of a rejection."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from bt_actions.utilities.names import told_apart
 from bt_actions.utilities.plain_text import clean
 
 _NOT_NOW = ("BUSY", "INACTIVE")
-"""Codes of rejections that say nothing against the tree or its inputs."""
+"""Codes of rejections that are no fault of the tree or its inputs."""
 
 
 def rejection(goal_name: str) -> tuple[Exit, str]:
-    """Ask why the server rejected a goal: whether what was asked for is wrong, and in words."""
+    """Ask for the reason of a rejection: return an exit code for the request, and words."""
     from bt_actions.serving.client import why_rejected
 
     why = why_rejected(goal_name)
@@ -32,7 +32,7 @@ def rejection(goal_name: str) -> tuple[Exit, str]:
 
 
 class CallView(GoalView):
-    """Which leaves run there, a line a change; at the end what `run` says of a run here."""
+    """The running leaves there, a line a change; at the end the lines of a `run` here."""
 
     def feedback_text(self, action: ActionStory) -> str:
         """Return the running leaves, deepest first."""
@@ -74,7 +74,7 @@ def _result(action: ActionStory) -> dict[str, Value]:
 
 
 def _listed(value: Value) -> list[dict[str, Any]]:
-    """The messages of a list."""
+    """Return the messages of a list."""
     return [plain(each) for each in value] if isinstance(value, tuple) else []
 
 
@@ -91,7 +91,7 @@ def _outputs(result: dict[str, Value]) -> dict[str, object]:
 
 
 def _actions(result: dict[str, Value]) -> list[ActionStory]:
-    """The ActionReports of a result as what became of actions here."""
+    """Return the ActionReports of a result as stories of actions."""
     from bt_actions.serving.outcome import ENDS, OUTCOMES, SEPARATOR
 
     outcomes = {number: outcome for outcome, number in OUTCOMES.items()}

@@ -1,4 +1,4 @@
-"""What watches a run: told every event after the state has taken it in, on the main thread.
+"""A view of a run: gets every event after the state has taken it in, on the main thread.
 
 A view only writes; it decides nothing. This one shows nothing.
 """
@@ -9,7 +9,7 @@ from bt_actions.events import Event
 
 
 class View:
-    """What watches a run."""
+    """A view of a run."""
 
     @property
     def fileno(self) -> int:
@@ -17,19 +17,19 @@ class View:
         return -1
 
     def due(self, now: float) -> None:
-        """Show what is shown because it has lasted until `now`, on the steady clock."""
+        """Show what has lasted until `now`, on the steady clock."""
 
     def event(self, event: Event) -> None:
         """Show one event."""
 
     def frame(self, now: float) -> None:
-        """Show what changes without an event, `now` on the steady clock; ten times a second."""
+        """Show changes without an event, `now` on the steady clock; ten times a second."""
 
     def say(self, text: str) -> None:
         """Tell the user something about the run itself."""
 
     def finish(self) -> None:
-        """Show how it ended; nothing is shown after it."""
+        """Show the end of the run; nothing is shown after it."""
 
     def close(self) -> None:
         """Give the terminal back, whether or not `finish` was called; may be called twice."""

@@ -1,6 +1,6 @@
 """All runs of a user at once: drawn anew in a terminal, or a line for each change.
 
-What ends scrolls by once, with why it failed.
+The end of a run scrolls by once, with the cause of a failure.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ NOTHING = "no run goes on"
 
 
 def title(seen: Seen) -> str:
-    """Say which run it is, and how it stands."""
+    """Return the name of a run, and its state."""
     where = " in sim" if seen.summary.is_simulated else ""
     return f"{seen.summary.tree}  {seen.summary.run_id[:8]}{where}  {seen.word}"
 
@@ -41,7 +41,7 @@ class WatchedLines:
         self._told: dict[str, tuple[str, ...]] = {}
 
     def show(self, runs: Iterable[Seen]) -> None:
-        """Write what has changed since the last time. Raises OutputLost or BrokenPipeError."""
+        """Write the changes since the last call. Raises OutputLost or BrokenPipeError."""
         for seen in runs:
             key, words = seen.summary.run_id, _lasting(seen)
             before = self._told.get(key, ("",))
@@ -56,14 +56,14 @@ class WatchedLines:
                         self._say(f"{seen.summary.tree}  {key[:8]}  {line}")
 
     def close(self) -> None:
-        """Nothing is left to do."""
+        """Do nothing: lines leave nothing behind."""
 
     def _say(self, text: str) -> None:
         write(f"{time.strftime('%H:%M:%S')}  {text}\n")
 
 
 def _lasting(seen: Seen) -> tuple[str, ...]:
-    """What is told of a run, without what changes all the time; first, how it stands."""
+    """Return the words about a run, without those that change all the time; its state first."""
     word = seen.look if seen.look == "lost" or seen.word.startswith("Stale") else seen.word
     does = []
     for each in () if seen.is_over else seen.state.running:
@@ -74,17 +74,17 @@ def _lasting(seen: Seen) -> tuple[str, ...]:
 
 
 class WatchedScreen:
-    """The runs that go on, at the bottom of a terminal; above them what has ended."""
+    """The runs that go on, at the bottom of a terminal; above them the ended ones."""
 
     def __init__(self, console: Console, last: str) -> None:
-        """`last` says how the last run ended, for as long as none goes on."""
+        """Take a console; `last` tells the end of the last run while no run goes on."""
         self._console, self._last = console, last
         self._is_plain = console.options.ascii_only
         self._ended: set[str] = set()
         self._live = drawing(console)
 
     def show(self, runs: list[Seen]) -> None:
-        """Draw how the runs stand; let those scroll by that have ended."""
+        """Draw the states of the runs; let ended runs scroll by."""
         for seen in runs:
             if seen.is_over and seen.summary.run_id not in self._ended:
                 self._ended.add(seen.summary.run_id)
