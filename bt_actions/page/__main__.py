@@ -1,4 +1,4 @@
-"""Serves this user's page until nobody has looked for ten minutes: `run --view` starts it.
+"""This user's page, served until ten minutes have passed without a browser: `run --view` starts it.
 
 Prints the address, and writes nothing after it.
 """

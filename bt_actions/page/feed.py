@@ -1,8 +1,8 @@
-"""What a browser is told of a run: its events in batches, then what comes, and a heartbeat.
+"""The feed of a browser: the events of a run in batches, later events, and a heartbeat.
 
-The files of the run are the only store: each browser has a place of its own in them, and is told no
-faster than it takes. So a browser that stops reading costs one batch of memory, and resumes by the
-number of the last event that it has.
+The files of the run are the only store. Each browser has its own place in them, and gets events no
+faster than it takes them: a browser that stops reading costs one batch of memory, and resumes by
+the number of its last event.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def message(kind: str, data: object, number: str = "") -> bytes:
 async def told(
     first: Path, run_id: str, after: int, closing: Callable[[], bool]
 ) -> AsyncIterator[bytes]:
-    """Yield what a browser is told of a run behind the event `after`, until the run is over.
+    """Yield the messages of a run for a browser, behind the event `after`, until the run is over.
 
     Raises OSError, and ValueError for a file that is none of ours.
     """
@@ -86,13 +86,13 @@ class _Feed:
     def __init__(self, follower: Follower, run_id: str, after: int) -> None:
         self._follower, self._run_id = follower, run_id
         self._seen = 0.0
-        """When the latest event happened, in seconds since 1970."""
+        """The moment of the latest event, in seconds since 1970."""
         self.number = after
-        """Of the latest event that the browser was told."""
+        """The number of the browser's latest event."""
         self.ended = False
-        """Whether the run was told to be over."""
+        """Whether the browser was told that the run is over."""
         self._unrecorded = ""
-        """Since when nothing of a run that goes on is recorded, and why, or ""."""
+        """Since when a run that goes on is not recorded, and why; or ""."""
 
     def ask(self) -> None:
         """Ask whether the run goes on without being recorded."""
@@ -100,7 +100,7 @@ class _Feed:
         self._unrecorded = next(told, "")
 
     def end(self) -> dict[str, Any]:
-        """Return how the run ended, as far as that is known, and when it was last seen."""
+        """Return the end of the run, as far as it is known, and the last sign of life."""
         recording = self._follower.recording
         summary = read_summary(recording.first) or Summary("", "", 0.0)
         seen = max(recording.last_beat or 0.0, self._seen)
@@ -113,7 +113,7 @@ class _Feed:
         }
 
     def beat(self, *, is_written: bool) -> dict[str, Any]:
-        """Return what is known of the run's process."""
+        """Return the signs of life of the run's process."""
         recording = self._follower.recording
         return {
             "clock": recording.last_beat,
@@ -124,7 +124,7 @@ class _Feed:
         }
 
     def batches(self) -> Iterator[dict[str, Any]]:
-        """Yield what has come since the last look, each with the numbers that it covers."""
+        """Yield the batches since the last look, each with the numbers that it covers."""
         events: list[dict[str, Any]] = []
         last = self.number
         for item in self._follower.news():
@@ -154,7 +154,7 @@ class _Feed:
 
 
 def known(state: State) -> dict[str, Any]:
-    """Return a state as one event for the page: it holds those that lead to what is known."""
+    """Return a state as one event for the page, which holds the events that lead to it."""
     assert state.now is not None
     pending = {
         number: [_failure(each) for each in story.pending]

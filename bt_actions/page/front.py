@@ -1,4 +1,4 @@
-"""What the page's front is told: how all runs stand, each second, for as long as it listens."""
+"""The feed of the page's front: the state of all runs, each second, while a browser listens."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from bt_actions.page.feed import message
 from bt_actions.recording.watching import Seen, Watch
 
 EACH = 1.0
-"""Seconds between two messages: a browser that hears nothing knows that the server is gone."""
+"""Seconds between two messages: without one, a browser knows that the server is gone."""
 
 
 async def standing(closing: Callable[[], bool]) -> AsyncIterator[bytes]:
-    """Yield how the runs stand that go on, or have ended since."""
+    """Yield the states of the runs that go on, or have ended since."""
     with contextlib.closing(Watch()) as watch:
         while not closing():
             runs = await asyncio.to_thread(watch.look)

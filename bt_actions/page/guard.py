@@ -1,6 +1,6 @@
-"""Who may ask the page's server: a page of its own, opened by who has the user's token.
+"""Access to the page's server: for its own page, in a browser with the user's token.
 
-The page's own files hold nothing of anybody's. All else is told to a browser that has posted the
+The page's own files hold no user's data. Everything else goes to a browser that has posted the
 token of the page's address, and got a cookie for it.
 """
 
@@ -34,16 +34,16 @@ _HEADERS = {
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where the page is served: on loopback, or elsewhere with a certificate."""
+    """The address of the page: on loopback, or elsewhere with a certificate."""
 
     host: str = "127.0.0.1"
     certificate: Path | None = None
     key: Path | None = None
-    """Of the certificate, where that does not hold it."""
+    """The certificate's key, where the certificate does not hold it."""
 
     @property
     def scheme(self) -> str:
-        """What browsers talk."""
+        """The scheme of the address."""
         return "http" if self.certificate is None else "https"
 
 
@@ -51,16 +51,16 @@ LOOPBACK = Place()
 
 
 class Guard:
-    """Refuses who has no token, and what another page sends; adds what keeps our page in."""
+    """Refuses requests without a token, and those of other pages; confines our page by headers."""
 
     def __init__(self, app: ASGIApp, place: Place, token: str, free: Collection[str]) -> None:
-        """`free` are the paths that anybody may ask for."""
+        """Guard `app`; `free` are the paths without a token."""
         self._app, self._place, self._token, self._free = app, place, token, free
         self._asking, self._asked = 0, time.monotonic()
 
     @property
     def silence(self) -> float:
-        """Seconds since somebody who may has asked for anything, or had an open stream."""
+        """Seconds since the last allowed request, or the end of the last open stream."""
         return 0.0 if self._asking else time.monotonic() - self._asked
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -85,7 +85,7 @@ class Guard:
             await self._tell(request, guarded)
 
     async def _enter(self, request: Request) -> Response:
-        """Change the token for a cookie; of a longer text nothing is read."""
+        """Change the token for a cookie; a longer text is not read."""
         given = b""
         async for part in request.stream():
             given += part
@@ -114,13 +114,13 @@ class Guard:
 
 
 def _cookie(request: Request) -> str:
-    """Return the name of the cookie: it has the port, as ports of one host share their cookies."""
+    """Return the name of the cookie, with the port in it: ports of one host share their cookies."""
     port = request.headers["host"].rpartition(":")[2]
     return f"bt_actions_{port if port.isdecimal() else ''}"
 
 
 def refused(headers: Headers, place: Place = LOOPBACK) -> str:
-    """Say why a request with these headers is refused; "" where it is not."""
+    """Return why a request with these headers is refused; "" for an allowed one."""
     host = headers.get("host", "")
     names = _NAMES if place.certificate is None else (place.host,)
     if _name(f"//{host}") not in names:

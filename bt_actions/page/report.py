@@ -1,4 +1,4 @@
-"""Recorded runs as one HTML file, which shows them from a disk as the page does from its server."""
+"""Recorded runs as one HTML file, which shows them from a disk as the server's page does."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""The page's server: loopback only, reads only, and answers nobody but who has the user's token.
+"""The page's server: on loopback, for reading, and for browsers with the user's token alone.
 
-Runs are known by the ids of the recordings that there are: no text of a request is used as a path.
+A request names a run by the id of its recording: no text of a request is used as a path.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from bt_actions.page.static_files import static_files
 from bt_actions.recording.folders import Recorded, Summary, is_written, read_summary, recorded
 
 PORT = 8650
-"""The first port that is tried, and this many after it."""
+"""The first port to try; as many more follow."""
 PORTS = 50
 _MOST = 64
-"""Connections at a time; a browser has six of them at most."""
+"""Connections at a time; a browser has at most six."""
 _BUFFER = 65_536
-"""Bytes that the kernel holds for a browser which does not read."""
+"""Bytes that the kernel holds for a browser that does not read."""
 _TYPES = {"html": "text/html", "css": "text/css", "js": "text/javascript"}
 
 
 class NoPort(OSError):
-    """No port of those that were tried is free."""
+    """No free port among those that were tried."""
 
 
 def listen(port: int | None = None, place: Place = LOOPBACK) -> socket.socket:
@@ -66,22 +66,22 @@ def listen(port: int | None = None, place: Place = LOOPBACK) -> socket.socket:
 
 
 def address_of(opened: socket.socket, place: Place = LOOPBACK) -> str:
-    """Return where the page is."""
+    """Return the address of the page."""
     return f"{place.scheme}://{place.host}:{opened.getsockname()[1]}/"
 
 
 def id_of(given: Path) -> str:
-    """Return by which id the page knows a run that may lie anywhere."""
+    """Return the page's id of a run in any folder."""
     return next(_id(each) for each in _runs(given) if each.first == given)
 
 
 def server_of(
     given: Path | None = None, place: Place = LOOPBACK, *, idle: float | None = None
 ) -> uvicorn.Server:
-    """Return the page's server; `given` is a run that may lie anywhere.
+    """Return the page's server; `given` is a run in any folder.
 
-    Its `run(sockets=[listen()])` returns when a signal comes, after `should_exit` is set, or when
-    nobody has asked for `idle` seconds. Raises OSError.
+    Its `run(sockets=[listen()])` returns at a signal, after `should_exit` is set, or after `idle`
+    seconds without a request. Raises OSError.
     """
     config = uvicorn.Config(
         "",
@@ -107,7 +107,7 @@ def server_of(
 
 
 def _end(server: uvicorn.Server, guard: Guard, idle: float) -> None:
-    """End the server when nobody has asked for so many seconds."""
+    """End the server after so many seconds without a request."""
     while guard.silence < idle:
         time.sleep(idle / 100)
     server.should_exit = True
@@ -149,7 +149,7 @@ def _application(given: Path | None, closing: Callable[[], bool]) -> ASGIApp:
 
 
 async def _begun(stream: Any, known: str, after: int | None) -> Any:
-    """Tell a browser first to forget what it has where that cannot be gone on with."""
+    """Tell a browser first to forget its events, where they cannot be continued."""
     if known and after is None:
         yield message("reset", {})
     try:
@@ -160,7 +160,7 @@ async def _begun(stream: Any, known: str, after: int | None) -> Any:
 
 
 def _number(known: str, run_id: str) -> int | None:
-    """The number in ``RUN:NUMBER``, of this run; None where none is told."""
+    """Return the number in ``RUN:NUMBER``, of this run; None without one."""
     run, _, number = known.rpartition(":")
     return int(number) if run == run_id and number.isascii() and number.isdecimal() else None
 

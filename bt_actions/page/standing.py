@@ -1,7 +1,7 @@
-"""This user's view: the token that opens it, and the one that is running, which others may use.
+"""This user's view: the token that opens it, and the running view, which other commands may use.
 
-Both are files in the state directory of the user. A lock on the second one, which the kernel takes
-back from a process that is killed, tells whether the view runs.
+Both are files in the state directory of the user. A lock on the second file tells whether the view
+runs: the kernel takes the lock back from a killed process.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from bt_actions.recording.folders import home, is_written, locked
 
 
 class NoView(OSError):
-    """No view runs, and none could be started."""
+    """No running view, and no way to start one."""
 
 
 def token() -> str:
-    """Return the user's token, which is made at its first use. Raises OSError."""
+    """Return the user's token, made at its first use. Raises OSError."""
     path = _file("view.token")
     if not path.exists():
         new = path.with_name(f".{secrets.token_hex(8)}")
@@ -37,22 +37,22 @@ def token() -> str:
 
 
 def opening(address: str, shown: str = "") -> str:
-    """Return what a user opens: the address with the token, and what is to be shown.
+    """Return the address for the user to open, with the token and the thing to be shown.
 
-    Raises OSError where there is no token, nor can one be kept.
+    Raises OSError where no token can be read or kept.
     """
     return f"{address}#token={token()}{shown and f'&{shown}'}"
 
 
 def running() -> str:
-    """Return where the view of this user is that runs; "" where none does."""
+    """Return the address of this user's running view; "" for none."""
     path = home().parent / "view.address"
     return path.read_text() if is_written(path) else ""
 
 
 @contextlib.contextmanager
 def registered(place: str) -> Iterator[None]:
-    """Have others use the view at `place` meanwhile, unless another one runs. Raises OSError."""
+    """Offer the view at `place` to other commands, unless another one runs. Raises OSError."""
     path = _file("view.address")
     if is_written(path):
         yield
@@ -62,7 +62,7 @@ def registered(place: str) -> Iterator[None]:
 
 
 def shown() -> str:
-    """Return where this user's view is; start one where none runs, which ends when nobody looks.
+    """Return the address of this user's view; start one where none runs, which ends by itself.
 
     Raises NoView.
     """
@@ -85,7 +85,7 @@ def shown() -> str:
 
 
 def _file(name: str) -> Path:
-    """Return the place of a file in a folder that is there, and the user's own."""
+    """Return the path of a file in a folder of the user's own, which is made if needed."""
     folder = home().parent
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     return folder / name

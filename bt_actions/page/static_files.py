@@ -8,6 +8,6 @@ from bt_actions.render.look import STATIC
 
 
 def static_files() -> dict[str, str]:
-    """Return their texts by name."""
+    """Return the texts of the files by name."""
     folders = (STATIC, Path(__file__).parent / "static")
     return {path.name: path.read_text("utf-8") for each in folders for path in each.iterdir()}

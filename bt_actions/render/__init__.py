@@ -1,10 +1,10 @@
 """A tree as text, dot, SVG, PNG or a page for the browser.
 
-Layout and drawing of SVG and PNG use the Graphviz libraries inside the pygraphviz wheel, in this
-process: no `dot` on the PATH. The page is made in page.py.
+The Graphviz libraries inside the pygraphviz wheel lay out and draw SVG and PNG in this process: no
+`dot` on the PATH. page.py makes the page.
 
-A tree is given as the values that the first event of a run has of its nodes: of a recorded run, or
-of a tree that is loaded (`bt_actions.document.describing.nodes_of`).
+A tree comes as the values that the first event of a run has of its nodes: of a recorded run, or of
+a loaded tree (`bt_actions.document.describing.nodes_of`).
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def content(
     """Return the bytes of a file of a tree in one of FORMATS; a page shows the nodes' cards, too.
 
     With `depth`, only so many levels below the root; a page has all of them, and starts folded.
-    Raises RenderError for any other format, and when it cannot be drawn.
+    Raises RenderError for any other format, and for a tree that cannot be drawn.
     """
     if form == "txt":
         return text(nodes, depth=depth).encode()

@@ -1,6 +1,6 @@
-"""Lays out and draws dot with the Graphviz libraries inside the pygraphviz wheel, in this process.
+"""Layout and drawing of dot with the Graphviz libraries inside the pygraphviz wheel.
 
-No `dot` on the PATH is needed, none is started. Knows nothing of behaviour trees.
+All work is done in this process: no `dot` on the PATH is started. Knows nothing of behaviour trees.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def _centred(svg: str) -> str:
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[Callable[[], str]]:
-    """Keep what the C libraries write to file descriptor 2; give a callable that returns it.
+    """Keep the output of C libraries on file descriptor 2; yield a function that returns it.
 
     Fontconfig reports its own configuration's oddities there, on every machine that has any.
     """

@@ -1,6 +1,6 @@
 """The look of a node, for every picture and page of a tree: words, shape, colours.
 
-static/looks.js holds the table, and says the same of a node to a page. Draws and lays out nothing.
+static/looks.js holds the table, and tells a page the same of a node. Draws and lays out nothing.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class NodeRow:
     node: Node
     depth: int
     branches: tuple[bool, ...]
-    """For each level below the root: does the line go on below this node?"""
+    """For each level below the root: whether the line goes on below this node."""
     below: int
     """Nodes below this one."""
     is_folded: bool = False
@@ -73,7 +73,7 @@ def direction_of(nodes: Iterable[NodeRow], direction: str | None = None) -> str:
 
 
 def left_out(row: NodeRow) -> str:
-    """Return what a picture says of the nodes below `row` that it does not show, or nothing."""
+    """Return the words for the nodes below `row` that a picture leaves out, or ""."""
     return f"+ {row.below:,} more" if row.is_folded else ""
 
 
@@ -93,12 +93,12 @@ def label(node: Node) -> tuple[list[str], list[str]]:
 
 
 def gates_of(node: Node) -> list[str]:
-    """Return the conditions under which a node is there at all."""
+    """Return the conditions of a node, without which it is left out."""
     return [f"{key} {node.settings[key]!s}" for key in GATES if key in node.settings]
 
 
 def word_of(node: Node) -> str:
-    """Return what kind of composite a node is, one of COMPOSITES; of any other node its kind."""
+    """Return the composite that a node is, one of COMPOSITES; of any other node its kind."""
     return node.kind.removeprefix("reactive ").partition(",")[0]
 
 

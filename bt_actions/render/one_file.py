@@ -1,7 +1,7 @@
-"""One HTML file that shows data and needs nothing else: it loads nothing, and sends nothing.
+"""One HTML file with data and nothing else to need: it loads nothing, and sends nothing.
 
 Its policy for the browser (CSP) allows its one script and its one style, by their hashes. Data
-never becomes markup: it is in a script element that is not run, and that nothing in it can end.
+never becomes markup: a script element that is not run holds it, and no text in it can end that.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def script(main: str, modules: Mapping[str, str]) -> str:
 
 
 def policy(script: str, style: str) -> str:
-    """Return what the browser lets the file do: run this script, and use this style."""
+    """Return the file's rights in a browser: to run this script, and to use this style."""
     return (
         f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; "
         "img-src data:; base-uri 'none'; form-action 'none'; require-trusted-types-for 'script'"

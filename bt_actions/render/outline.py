@@ -30,7 +30,7 @@ def text(nodes: Sequence[Node], *, encoding: str = "utf-8", depth: int | None = 
 
 
 def _symbol(row: NodeRow) -> str:
-    """py_trees' text symbols: {-} sequence, {o} selector, [ ] without memory, /_/ parallel."""
+    """Return py_trees' symbol: {-} sequence, {o} selector, [ ] without memory, /_/ parallel."""
     word = word_of(row.node)
     if word == "parallel":
         return "/_/"

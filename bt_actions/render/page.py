@@ -1,11 +1,11 @@
 """A tree as one HTML file that shows, for each node, its YAML, its policies and its types.
 
-The layout is made in the reader's browser, not by Graphviz, because it changes with every fold; and
-because a browser measures text with the font that it draws with. Here the tree becomes data: what
-each node is called and says. page.html, page.css, page.js and the modules in static/ show it.
+The reader's browser makes the layout, not Graphviz: the layout changes with every fold, and only a
+browser measures text with the font that it draws with. Here the tree becomes data: the names and
+words of each node. page.html, page.css, page.js and the modules in static/ show it.
 
 Text from a tree never becomes markup: in the page it is data, which the script sets as text.
-Nothing in the page may depend on when or where it was made.
+Nothing in the page may depend on the time or the place of its making.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
     from bt_actions.document.cards import Card, Table
 
 MOST_NODES = 20_000
-"""Nodes of the largest tree that a page is made of."""
+"""Nodes of the largest tree that has a page."""
 OPEN_UP_TO = 40
 """Nodes that a page shows at first; a larger tree starts folded."""
 UNFOLDED_UP_TO = 3000
-"""Nodes that it shows when all is to be unfolded: about a second's work for a browser."""
+"""Nodes that a page shows at "unfold all": about a second's work for a browser."""
 
 _FOLDER = Path(__file__).parent
 _PLACEHOLDER = re.compile(r"\{\{([a-z]+)\}\}")

@@ -1,4 +1,4 @@
-"""A thread that does in batches what others queue for it: they wake it, and never wait for it."""
+"""A thread that works in batches on other threads' work: they wake it, and never wait for it."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import traceback
 from collections.abc import Callable
 
 BATCH = 0.05
-"""Seconds for which work gathers before it is done."""
+"""Seconds in which work gathers before a step."""
 BEAT = 1.0
-"""Seconds between two steps where nobody has work."""
+"""Seconds between two steps without work."""
 
 
 class Batches:
     """Calls `step` on a thread of its own, from `start` until `close`.
 
-    `step` is told whether it is called for the last time. What it raises is logged: others have
-    work for the same thread.
+    `step` gets True at its last call. An exception of a step is logged: others have work for the
+    same thread.
     """
 
     def __init__(self, name: str, step: Callable[[bool], None]) -> None:
@@ -27,7 +27,7 @@ class Batches:
         self._closing = False
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self.poke = self._news.set
-        """Have work done soon; on any thread."""
+        """Let a step follow soon; on any thread."""
 
     def start(self) -> None:
         """Begin; not on two threads at once. Later calls do nothing."""
@@ -35,7 +35,7 @@ class Batches:
             self._thread.start()
 
     def close(self, patience: float) -> None:
-        """Have all work done; wait so many seconds at most, as a disk may hang."""
+        """Finish all work; wait so many seconds at most, as a disk may hang."""
         self._closing = True
         self.poke()
         if self._thread.ident is not None:

@@ -1,4 +1,4 @@
-"""Ids that tell which process chose them, so that what a killed one left can be found. No ROS.
+"""Ids that tell which process chose them, so that a killed process' goals can be found. No ROS.
 
 An id has the 16 bytes of a goal's, which is ours to choose: 3 that say "bt_actions", 3 for the
 machine (its pid and time namespaces included), 4 for the process id, 2 for the moment that process
@@ -24,7 +24,7 @@ MACHINE = "BT_ACTIONS_MACHINE"
 that is started again has another pid namespace, and its predecessor's goals would be somebody's."""
 _MAGIC = hashlib.sha256(b"bt_actions goal id 1").digest()[:3]
 _HIDDEN = b"\0\0"
-"""Stands for the moment of a start that cannot be read."""
+"""The stand-in for the moment of a start that cannot be read."""
 _lock = threading.Lock()
 _made_by: tuple[int, bytes, itertools.count[int]] | None = None
 
@@ -34,13 +34,13 @@ class Author:
     """The process that chose an id."""
 
     here: bool
-    """On this machine, where its process can be looked for."""
+    """Whether the process ran on this machine, where it can be looked for."""
     pid: int
     started: bytes
 
     @property
     def alive(self) -> bool:
-        """Whether that process still runs; one that cannot be looked for counts as alive."""
+        """Whether the process still runs; a process elsewhere counts as alive."""
         if not self.here:
             return True
         started = _start_of(self.pid)
@@ -61,7 +61,7 @@ def new_id() -> bytes:
 
 
 def author_of(goal_id: bytes) -> Author | None:
-    """Return who chose the id, or None when it was not made by bt_actions."""
+    """Return the author of an id, or None where bt_actions did not make it."""
     if len(goal_id) != 16 or goal_id[:3] != _MAGIC:
         return None
     here = goal_id[3:6] == _machine()
@@ -75,7 +75,7 @@ def _machine() -> bytes:
 
 @functools.lru_cache(maxsize=1)
 def _name_of_machine(_pid: int) -> str:
-    """Return what sets this machine apart for the process that asks; a fork may be elsewhere.
+    """Return a name of this machine for the calling process; a fork may be elsewhere.
 
     In another time namespace the same process has another moment of its start.
     """
@@ -89,7 +89,7 @@ def _name_of_machine(_pid: int) -> str:
 
 
 def _start_of(pid: int) -> bytes | None:
-    """Return a token of the moment a process started; None when there is no such process."""
+    """Return a token of the moment a process started; None for a process that is gone."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:  # there is none, or /proc does not show it, or no file can be opened

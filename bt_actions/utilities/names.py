@@ -1,4 +1,4 @@
-"""Paths of names told apart by as little of them as will do."""
+"""Names told apart by as little of their paths as possible."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 
 def told_apart(paths: Iterable[tuple[str, ...]]) -> dict[tuple[str, ...], str]:
-    """Return for each path its name, behind as much of the path as no other one ends with."""
+    """Return for each path its name, with the shortest beginning that no other path shares."""
     texts: dict[tuple[str, ...], str] = {}
     left, size = set(paths), 1
     while left:

@@ -1,4 +1,4 @@
-"""Work that may hang, as a read from a stuck mount does: it is left behind, others go on."""
+"""Work that may hang, as a read from a stuck mount does: such work is left behind."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from typing import Any, Self, TypeVar
 
 T = TypeVar("T")
 _LEAST = 0.1
-"""Seconds in which a file is read where nothing is wrong with its disk."""
+"""Seconds for the read of a file from a sound disk."""
 _Jobs = queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None]
 
 
 class Patience:
-    """Does one piece of work after another on a thread of its own, and waits so long for each.
+    """Does one piece of work after another on a thread of its own, with a bounded wait for each.
 
-    Each is waited for `seconds`, and for half as long with each other one that hangs, as many files
-    may lie on one stuck mount. A context manager, at whose end the thread goes; for one user at a
-    time.
+    The wait is `seconds`, and half as long for each further piece that hangs, as many files may lie
+    on one stuck mount. A context manager, at whose end the thread goes; for one user at a time.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -37,8 +36,8 @@ class Patience:
     def __call__(self, key: Hashable, work: Callable[[], T]) -> T:
         """Return what `work` returns, or raise what it raises.
 
-        Raises TimeoutError where it takes too long. It goes on, and is not begun again meanwhile:
-        who asks for `key` when it is done is given what came of it.
+        Raises TimeoutError for work that takes too long. The work goes on, and is not begun again
+        meanwhile: a later call for `key` gets its result.
         """
         future: Future[T] | None = self._hanging.get(key)
         if future is None:
@@ -66,7 +65,7 @@ class Patience:
         return future
 
     def _leave_thread(self) -> None:
-        """Let it end with what it does."""
+        """Let the thread end with its present work."""
         if self._jobs is not None:
             self._jobs.put(None)
             self._jobs = None

@@ -1,4 +1,4 @@
-"""Plain data, numpy's among it: numbers, texts, lists and mappings. No ROS.
+"""Plain data, also from numpy: numbers, texts, lists and mappings. No ROS.
 
 A float32 is read as the shortest number that stands for it: Python has float64 alone, in which the
 float32 that is next to 0.7 is 0.699999988079071. Written to a float32 again, both are the same.
@@ -13,17 +13,16 @@ from typing import Any
 _NUMBERS = frozenset({bool, int, float})
 _PLAIN = frozenset({bool, int, float, str})
 _GREATEST = 3.402823466e38
-"""Of the finite float32s."""
+"""The greatest finite float32."""
 
 
 def numbers_only(items: Iterable[object]) -> bool:
-    """Whether nothing but numbers is in a list; looks at millions without a loop of Python's."""
+    """Return whether a list holds numbers alone; a list of millions needs no loop of Python's."""
     return _NUMBERS.issuperset(map(type, items))
 
 
 def scalar(value: object) -> object:
-    """A numpy scalar, and a byte of ROS, as Python's own number; arrays stay as they are until
-    somebody compares them."""
+    """Return a numpy scalar, and a byte of ROS, as Python's own number; an array as it is."""
     if type(value) in _PLAIN:
         return value
     if isinstance(value, bytes) and len(value) == 1:
@@ -49,19 +48,19 @@ def plain(value: object) -> object:
 
 
 def item_of(items: Any, at: int) -> object:
-    """An item of a list, whatever holds it."""
+    """Return an item of a list of any type."""
     item = scalar(items[at])
     return shortest(item) if of_float32(items) else item
 
 
 def field_of(message: object, name: str, types: Mapping[str, str]) -> object:
-    """The value of a message's field; `types` are those of its fields, as rosidl names them."""
+    """Return a field of a message; `types` are those of its fields, in rosidl's names."""
     value = getattr(message, name)
     return shortest(value) if types.get(name) == "float" else scalar(value)
 
 
 def shortest(value: Any) -> Any:
-    """A number that came as a float32 by the fewest digits that give it; a list of them."""
+    """Return a former float32, or a list of them, by the fewest digits that give it."""
     if isinstance(value, list):
         return [shortest(item) for item in value]
     if not isinstance(value, float):
@@ -78,12 +77,12 @@ def shortest(value: Any) -> Any:
 
 
 def of_float32(value: Any) -> bool:
-    """Whether a numpy scalar, or the items of an array, are float32."""
+    """Return whether a numpy scalar, or the items of an array, are float32."""
     return getattr(value, "typecode", None) == "f" or str(getattr(value, "dtype", "")) == "float32"
 
 
 def same(one: object, other: object) -> bool:
-    """Return whether two values are equal; of arrays that can be told of the same one alone."""
+    """Return whether two values are equal; an array equals itself alone."""
     try:
         return bool(one == other)
     except ValueError:

@@ -1,7 +1,7 @@
 """Any value as one short text for people, in time that does not grow with the value.
 
-No ROS here: a message is recognised by what it can do, and what was cut (events/snapshot.py) by
-`head` and `more`. Nothing is made a text as a whole first.
+No ROS here: a message is known by its methods, and a cut value (events/snapshot.py) by `head` and
+`more`. No value is made a text as a whole first.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ LONG = 200
 """Characters of a value; longer ones are cut."""
 
 _ALL = 20
-"""A list with more items is shown by its first ones and their number."""
+"""Items of a list that are all shown; of a longer list, the first ones and the number are."""
 _FIRST = 3
 _NOTHING = object()
 Part = tuple[str, object]
-"""A text, and a value that stands behind it (or `_NOTHING`)."""
+"""A text, and a value that follows it (or `_NOTHING`)."""
 
 
 def brief(value: object) -> str:
-    """Return a value as people read it, short however large it is; a text without quotes."""
+    """Return a value for people, short however large it is; a text without quotes."""
     return fit(value, LONG) if isinstance(value, str) else shorten(value, LONG)
 
 
@@ -47,7 +47,7 @@ def scalars(fields: Iterable[tuple[str, object]], named: Callable[[str, int], st
 
 
 def shorten(value: object, limit: int = MESSAGE) -> str:
-    """Return a value as people write it in a tree: ``{x: 1.0, on: true, name: 'a'}``.
+    """Return a value in the notation of a tree: ``{x: 1.0, on: true, name: 'a'}``.
 
     A long list is ``[7, 7, 7, … 4000000 items]``; a text of more than `limit` characters is cut,
     and then ends with an ellipsis. Raises nothing, whatever the value's own methods do.
@@ -78,7 +78,7 @@ def shorten(value: object, limit: int = MESSAGE) -> str:
 
 
 def fit(text: str, limit: int = MESSAGE) -> str:
-    """Return a message as it is, or without its middle: its end often says what to do."""
+    """Return a message, a long one without its middle: the end often says what to do."""
     if len(text) <= limit:
         return text
     tail = limit // 3
@@ -86,7 +86,7 @@ def fit(text: str, limit: int = MESSAGE) -> str:
 
 
 def given_fields(message: object) -> dict[str, object]:
-    """Return the fields of a ROS message, by their names, that a new one of its type has not."""
+    """Return the fields of a ROS message that differ from a new one, by their names."""
     fields = getattr(message, "get_fields_and_field_types", dict[str, str])()
     plain = type(message)() if fields else None
     given: dict[str, object] = {}
@@ -106,7 +106,7 @@ def _equal(value: object, other: object) -> bool:
 
 
 def _parts(value: object) -> Iterator[Part] | None:
-    """What a value with others in it is made of; None for one that holds no others."""
+    """Return the parts of a value that holds others; None for any other value."""
     fields = getattr(type(value), "get_fields_and_field_types", None)
     if fields is not None:
         types = fields()
@@ -130,7 +130,7 @@ def _braced(members: Iterator[Part]) -> Iterator[Part]:
 
 
 def _cut(head: object, more: int) -> Iterator[Part] | None:
-    """The beginning of a value, of which so much more follows."""
+    """Return the beginning of a cut value, and a note of the rest."""
     if isinstance(head, str):
         return iter(((repr(f"{head}…"), _NOTHING),))
     if isinstance(head, Mapping):

@@ -1,6 +1,6 @@
-"""What a step of something that goes on in steps returns: when to step again, or what came of it.
+"""The results of a step, for work that goes on in steps: the time of the next step, or the end.
 
-So whoever steps it brings the clock and the wait: a thread, or a test in virtual time. Values only.
+The caller brings the clock and the wait: a thread, or a test in virtual time. Values only.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class Sleep:
-    """Step again in so many seconds, or as soon as something wakes it."""
+    """Another step in so many seconds, or at a wake-up before."""
 
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
 class Done(Generic[T]):
-    """It is over; there is nothing to step any more."""
+    """The end: no step follows."""
 
     result: T

@@ -1,7 +1,7 @@
-"""Gives a process whose standard output or standard error is closed (`>&-`) one that goes nowhere.
+"""Standard output and standard error for a process that has them closed (`>&-`): the null device.
 
-py_trees cannot be imported without `sys.stdout`, and a closed descriptor would be given to the
-next socket, to be printed on. Imports nothing of this package: it comes first.
+py_trees cannot be imported without `sys.stdout`, and the next socket would get a closed descriptor,
+to be printed on. Imports nothing of this package: this module comes first.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""'Did you mean': the closest of the known words, for every message that names an unknown one."""
+"""'Did you mean': the closest of the known words, for every message about an unknown one."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from collections.abc import Collection, Iterable, Mapping
 _LONGEST = 60
 _MOST = 60
 _BEGINNING = 4
-"""So many letters are meant as the beginning of a longer word rather than as another one."""
+"""Letters that stand for the beginning of a longer word rather than for another word."""
 _NAMED = 3
-"""Names of one type in other namespaces that are told, at most."""
+"""The most names of one type in other namespaces that a message has."""
 _ALIKE = 0.75
-"""How alike two full names must be: they share their namespaces."""
+"""The least likeness of two full names, which share their namespaces."""
 
 
 def closest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | None:
-    """The known word that `word` most likely stands for, or None when nothing is near.
+    """Return the known word that `word` most likely stands for, or None where nothing is near.
 
-    `cutoff` is how alike two words must be, 0 to 1.
+    `cutoff` is the least likeness of two words, 0 to 1.
     """
     if not 0 < len(word) <= _LONGEST:
         return None
@@ -39,12 +39,12 @@ def closest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str | No
 
 
 def folded(word: str) -> str:
-    """A word in one form: `ForceSuccess`, `force-success` and `force_success` are the same."""
+    """Return a word in one form, the same for `ForceSuccess`, `force-success`, `force_success`."""
     return word.casefold().replace("-", "").replace("_", "").replace(" ", "")
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:
-    """``a, b and c``, cut where there are many."""
+    """Return ``a, b and c``, cut where there are many."""
     known = list(names)
     if len(known) > limit:
         return f"{', '.join(known[:limit])} and {len(known) - limit} more"
@@ -52,19 +52,19 @@ def listing(names: Iterable[str], limit: int = 12) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
-    """``"; did you mean 'distance'?"``, or nothing."""
+    """Return ``"; did you mean 'distance'?"``, or ""."""
     near = closest(word, known, cutoff=cutoff)
     return f"; did you mean {near!r}?" if near else ""
 
 
 def what_it_has(word: str, known: Iterable[str], nothing: str = "") -> str:
-    """``"; did you mean 'distance'?"``, or ``"; it has x, y"``, or, of what has none, `nothing`."""
+    """Return ``"; did you mean 'distance'?"``, or ``"; it has x, y"``; `nothing` for no words."""
     known = list(known)
     return did_you_mean(word, known) or (f"; it has {listing(known)}" if known else nothing)
 
 
 def elsewhere(name: str, kind: str, known: Mapping[str, Collection[str]]) -> str:
-    """Name those of a type that end as `name` does, in other namespaces; or what looks like it.
+    """Name those of a type with the same last name in other namespaces; or a similar name.
 
     `known` has the types of each full name.
     """

@@ -1,4 +1,4 @@
-"""Numbers with a unit, as people write them: ``500 ms``, ``2 min``, ``90 deg``. No ROS here."""
+"""Numbers with a unit, in people's notation: ``500 ms``, ``2 min``, ``90 deg``. No ROS here."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ TURN = 2 * math.pi + 0.01
 """Radians, rounded up as people round. An angle beyond is likely to be meant in degrees."""
 _ANGLE_UNITS = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
 _LONG = 2
-"""Days from which hours are no help."""
+"""Days from which a text leaves the hours out."""
 _WITH_UNIT = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(\S*)\s*")
 
 
 def parse_duration(value: object) -> float:
-    """Seconds, from ``"500 ms"`` or a bare number of seconds; never negative, always finite.
+    """Return the seconds of ``"500 ms"`` or a bare number; never negative, always finite.
 
-    Raises ValueError with a text for the person who wrote it.
+    Raises ValueError with a text for the author.
     """
     seconds = parse_seconds(value)
     if seconds < 0:
@@ -37,12 +37,12 @@ def parse_duration(value: object) -> float:
 
 
 def parse_seconds(value: object) -> float:
-    """Seconds as `parse_duration` reads them, with either sign."""
+    """Return seconds as `parse_duration` does, with either sign."""
     return _parse(value, DURATION_UNITS, "a duration", "5 s")
 
 
 def spoken_duration(seconds: float) -> str:
-    """Seconds as people say them: ``8 min 20 s``; from two days on, ``3.5 days``."""
+    """Return seconds in people's words: ``8 min 20 s``; from two days on, ``3.5 days``."""
     days = seconds / 86_400
     if abs(days) >= _LONG:
         return f"{days:.6g} days"
@@ -54,9 +54,9 @@ def spoken_duration(seconds: float) -> str:
 
 
 def parse_angle(value: object) -> float:
-    """Radians, from ``"90 deg"``, ``"1.57 rad"`` or a bare number of radians.
+    """Return the radians of ``"90 deg"``, ``"1.57 rad"`` or a bare number.
 
-    Raises ValueError with a text for the person who wrote it.
+    Raises ValueError with a text for the author.
     """
     return _parse(value, _ANGLE_UNITS, "an angle", "90 deg")
 

@@ -1,4 +1,4 @@
-"""Files that are replaced as a whole: never half of one, and nothing left behind."""
+"""Files that are replaced as a whole: never half a file, and no temporary file left behind."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import BinaryIO
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write what a file shall hold from now on: all of it, or no change. Raises OSError.
+    """Write the new content of a file: all of it, or no change. Raises OSError.
 
-    A link still leads to it; its owner and permissions stay. What exists and is no file, as a pipe
-    or a device, is written to.
+    A link still leads to the file; its owner and permissions stay. A pipe or a device is written
+    to.
     """
     if path.exists() and not path.is_file():
         path.write_bytes(data)
@@ -25,9 +25,9 @@ def replace_file(path: Path, data: bytes) -> None:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Yield the file that is at `path` from the end of the block on, unless that raises.
+    """Yield a file that takes the place of `path` at the end of the block, unless that raises.
 
-    A link still leads to it; its owner and permissions stay. Raises OSError.
+    A link still leads to the file; its owner and permissions stay. Raises OSError.
     """
     before = path.stat() if path.exists() else None
     target = Path(os.path.realpath(path))
