@@ -1,1 +1,1 @@
-"""The expressions of `{...}`: reading them, and what they come to."""
+"""The expressions of `{...}`: the reading and the evaluation."""

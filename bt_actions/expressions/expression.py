@@ -1,8 +1,18 @@
 """Expressions of a tree: ``result.stalled and $count < 3``, parsed once, evaluated often.
 
-No ROS here. Evaluating calls nothing but what `functions.py` lists, reads no name that begins with
-an underscore, makes no large number and no large text, and raises nothing but
-`ExpressionError`. `form.py` parses the text.
+An expression goes through three stages. `text.py` translates the text into one that Python's parser
+reads (`$name` becomes `_name`), and keeps the origin of each character. `form.py` parses the
+translation, refuses every part of Python that it does not list, and makes each node a closure. This
+file lets expressions share forms: ``$left.x > 0`` and ``$right.x > 0`` differ in a name alone, so
+both become ``$v.x > 0`` and have one form from a cache. `Expression` keeps the names and gives them
+to the form, in reading order.
+
+Sharing has two costs. A form's columns are columns of ``$v.x > 0``: `_column` adds the lengths of
+the names before a column. And a quoted text may hold ``$name``, too: where the form reads fewer
+variables than the text has names, the expression gets a form of its own.
+
+No ROS here. Evaluation calls nothing but what `functions.py` lists, reads no name that begins with
+an underscore, makes no large number and no large text, and raises nothing but `ExpressionError`.
 """
 
 from __future__ import annotations
@@ -27,8 +37,7 @@ class Expression:
 
     `roots` are the bare names it may use (`result`, `feedback`, `message`, `item`). `variables` are
     the variables it reads, without the dollar sign, in reading order; `tree` is its syntax tree,
-    for type-checkers. Expressions that differ by the names of their variables alone have one
-    `form`, which is parsed once.
+    for type-checkers.
     """
 
     __slots__ = ("form", "text", "variables")
@@ -40,7 +49,7 @@ class Expression:
         roots: Iterable[str] = frozenset({"result"}),
         constants: Callable[[str], object] | None = None,
     ) -> None:
-        """Read `text`; raises ExpressionError.
+        """Read `text`. Raises ExpressionError.
 
         `constants` returns the value of ``MoveRobot.Result.STATUS_FAULT``, or raises ValueError,
         when the expression is evaluated.
@@ -74,7 +83,7 @@ class Expression:
 
     @property
     def asked(self) -> frozenset[str]:
-        """The variables that `known` asks for: this expression is right where they lack a value."""
+        """The variables that `known` asks for: the expression is right without their values."""
         asked = self.form.asked
         if not asked:
             return frozenset()
@@ -115,9 +124,9 @@ class Expression:
     def seen(
         self, roots: Mapping[str, object], variable: Callable[[str], object]
     ) -> dict[str, object]:
-        """What stands for each name in it, with the fields that are read of it, as it is written.
+        """Return the value of each name in the expression, with the fields that are read of it.
 
-        What has no value is left out. Raises nothing.
+        Names stand as they are written. A name without a value is left out. Raises nothing.
         """
         found: dict[str, object] = {}
         waiting: list[ast.AST] = [self.tree]
@@ -148,14 +157,14 @@ class Expression:
         return self._column(start), self._column(end - 1) + 1
 
     def _column(self, at: int) -> int:
-        """Return the column in `text` of one in the text of its form, where every name is `v`."""
+        """Return the column in `text` of a column in the form's text, where every name is `v`."""
         starts = [self.form.span(node)[0] for node in self.form.variables.values()]
         return at + sum(
             len(name) - 1 for name, start in zip(self.variables, starts, strict=True) if start < at
         )
 
     def reads_field_of(self, name: str) -> bool:
-        """Return whether it reads a field of a variable, as it does of a message."""
+        """Return whether the expression reads a field of a variable, as of a message."""
         return any(
             isinstance(node, ast.Attribute) and self.variable_of(node.value) == name
             for node in ast.walk(self.tree)

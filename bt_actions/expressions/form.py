@@ -1,7 +1,7 @@
-"""The text of an expression parsed and compiled: its form, which is the same for many expressions.
+"""The form of an expression: its text parsed and compiled, shared by many expressions.
 
-No ROS here. Python's own ``ast`` does the parsing; only what `Form._compile` lists is let through,
-and each node becomes a closure. Says what is wrong with a text and where.
+No ROS here. Python's own ``ast`` does the parsing. Only nodes that `Form._compile` lists are let
+through, and each becomes a closure. An error names what is wrong with a text, and where.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Form:
         self.variables: dict[int, ast.Name] = {}
         """The nodes that read a variable, by their places, in reading order."""
         self.asked: set[int] = set()
-        """The places of those that `known` asks for."""
+        """The places of the variables that `known` asks for."""
         self.evaluate = self._compile(self.tree, 0)
 
     def span(self, node: ast.expr) -> tuple[int, int]:
@@ -275,7 +275,7 @@ class Form:
 
 
 class Failed(Exception):
-    """A part of an expression has no value, and why."""
+    """A part of an expression without a value, and the reason."""
 
     def __init__(self, node: ast.expr, why: str | Exception) -> None:
         self.node = node

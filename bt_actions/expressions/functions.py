@@ -1,7 +1,7 @@
-"""The functions of expressions, and what other languages call them.
+"""The functions of expressions, and their names in other languages.
 
-No ROS here, and no code of a tree's author: each takes plain values and raises ValueError with a
-readable text. None of them makes a large number or a large text.
+No ROS here, and no code of a tree's author: a function takes plain values, and raises ValueError
+with a readable text. No function makes a large number or a large text.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from bt_actions.expressions.values import LENGTHS, number, show
 from bt_actions.utilities.plain_data import of_float32, plain, scalar, shortest
 
 KNOWN = "known"
-"""The function that asks for a value and does not read it: `form.py` has its code."""
+"""The function that asks for a value without reading it: `form.py` has its code."""
 _DIGITS = 15
-"""Of a fraction, which a float64 can tell apart."""
+"""Digits of a fraction that a float64 can tell apart."""
 _CALLED = {
     "len": " ".join(LENGTHS),
     "str": "string tostring to_string text",
@@ -30,7 +30,7 @@ _CALLED = {
 _FOREIGN = {word: name for name, words in _CALLED.items() for word in words.split()}
 """Our functions by the names of other languages."""
 _JOINS = {"append": "[{}]", "push": "[{}]", "push_back": "[{}]", "extend": "{}", "concat": "{}"}
-"""How other languages join lists, and what stands here behind a plus sign."""
+"""Joins of lists in other languages, and what stands here behind a plus sign."""
 _WHOLE = re.compile(r"\s*[-+]?[0-9]{1,100}\s*", re.ASCII)
 _FRACTION = re.compile(
     r"\s*[-+]?([0-9]{1,100}(\.[0-9]{0,100})?|\.[0-9]{1,100})([eE][-+]?[0-9]{1,3})?\s*", re.ASCII
@@ -132,11 +132,11 @@ FUNCTIONS = MappingProxyType[str, Callable[..., object]](
         "str": _str,
     }
 )
-"""By name; `known` is not among them."""
+"""The functions by name; `known` is not among them."""
 ARGUMENTS = MappingProxyType(
     {name: {"min": 0, "max": 0, "round": 2}.get(name, 1) for name in (*FUNCTIONS, KNOWN)}
 )
-"""How many values each function takes at most; 0: as many as there are."""
+"""The most values that each function takes; 0: any number."""
 
 
 def listed() -> str:
@@ -148,7 +148,7 @@ def listed() -> str:
 def instead_of(name: str, owner: str | None, arguments: list[str]) -> str | None:
     """Return what to write for a call of another language: ``length($x)``, ``$x.append(1)``.
 
-    `owner` is what stands before the dot of a method. None where nothing is known.
+    `owner` is the text before the dot of a method. None for an unknown call.
     """
     ours = _FOREIGN.get(name.lower())
     values = arguments if owner is None else [owner, *arguments]

@@ -15,7 +15,7 @@ _RUN_ON = re.compile(
     r"""'[^']*'|"[^"]*"|(?<![\w.$])(?:0[xX][0-9a-fA-F]+?|[\d.][\d._]*(?:[eE][+-]?\d+)?[jJ]?)"""
     r"(and|else|for|if|in|is|not|or)\b"
 )
-"""A number and a word without a space between: Python reads it so far, and warns."""
+"""A number and a word without a space between: Python reads both apart, and warns."""
 _FIELD = re.compile(rf"""'[^']*'|"[^"]*"|\.({"|".join(keyword.kwlist)})\b""")
 _FOREIGN = re.compile(
     r"""'[^']*'|"[^"]*"|(?P<equal>[!=]==)|(?<![\w.$])(?P<word>(?!and|or|not)(?i:and|or|not))\b"""
@@ -70,7 +70,7 @@ class ExpressionError(ValueError):
 
 
 class Source(NamedTuple):
-    """The text as Python can read it, and where each of its characters came from."""
+    """A text that Python can read, and the origin of each of its characters."""
 
     text: str
     origin: Sequence[int]

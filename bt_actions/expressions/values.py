@@ -1,8 +1,8 @@
 """The work of an expression's parts on values: fields, items, numbers, comparisons.
 
-No ROS here: a message is recognised by what it can do. A function here raises `ValueError` with
-a readable text, or whatever the value itself raises; `expression.py` turns both into its error
-with a place. None of them makes a large number or a large text.
+No ROS here: a message is known by its methods. A function here raises `ValueError` with a readable
+text, or whatever the value itself raises; `expression.py` turns both into its error with a place.
+No function makes a large number or a large text.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from bt_actions.utilities.shorten import shorten
 MAX_BITS = 256
 MAX_ITEMS = 10_000
 MAX_JOINED = 100_000
-"""Items in a list that is joined of others."""
+"""Items of a list joined from others."""
 LENGTHS = ("length", "size", "count")
 """Names of `len` in other languages."""
 

@@ -1,7 +1,7 @@
 """Short forms of a message's fields: times, durations, angles, constants by name.
 
-Each function leaves alone what it does not know, and raises ValueError with a readable text for
-what it knows and finds wrong.
+A function returns an unknown form unchanged, and raises ValueError with a readable text for a
+known form with a mistake.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _seconds(value: object) -> object:
 def quaternion_of(value: object, angle: Callable[[str, object], float]) -> object:
     """Return ``{yaw: 90 deg}`` (and roll, pitch: fixed axes x, y, z) as a unit quaternion's fields.
 
-    `angle` gives the radians of what is written for one of them.
+    `angle` returns the radians of one of them.
     """
     if not isinstance(value, Mapping) or not any(name in value for name in ANGLES):
         return value

@@ -1,6 +1,6 @@
 """A ROS message from plain data and back, checked field by field against its type.
 
-Pure functions: no node, no clock of their own unless none is given, and no rclpy.
+All functions are pure: no node, no rclpy, and no clock unless the caller gives none.
 """
 
 from __future__ import annotations
@@ -35,8 +35,9 @@ Path = tuple[str | int, ...]
 Hole = Callable[[object, FieldType, Path], bool]
 M = TypeVar("M")
 _CODES = dict(zip([*FLOATS, *INTEGERS], "fdbhiqBHIQ", strict=False))
-"""How rosidl keeps a sequence of numbers, by its type: as an array.array with this type code. Those
-of the last type, `byte`, it keeps in a list."""
+"""The type code of the array.array in which rosidl keeps a sequence of numbers, by its type. A list
+holds those of the last type, `byte`.
+"""
 ANGLE = Scalar("float64")
 """The type of roll, pitch and yaw: this very object says that they are radians."""
 _NUMBER = re.compile(r" *[-+]?[0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)? *(?P<unit>[A-Za-z/%°]{0,9})")
@@ -47,7 +48,7 @@ _NO_TEXT = re.compile(r"[\0\ud800-\udfff]")
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing wrong with the data: where (`at_key`: the field's name itself), and what."""
+    """One mistake in the data: its place (`at_key`: the field's name itself), and what is wrong."""
 
     path: Path
     text: str
@@ -58,7 +59,7 @@ class Problem:
 
 
 class MessageError(ValueError):
-    """The data does not fit the message's type."""
+    """Data that does not fit a message's type."""
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         super().__init__("; ".join(str(problem) for problem in problems[:10]))
@@ -76,7 +77,7 @@ def fill(message_type: type[M], data: object, *, now: Callable[[], int] = time.t
 
 
 def fill_value(kind: FieldType, data: object) -> object:
-    """Make a value of type `kind` as a tree has it: a byte is a number, an array stays an array.
+    """Make a value of type `kind` in a tree's form: a byte is a number, an array stays an array.
 
     Raises MessageError.
     """
@@ -96,7 +97,7 @@ def _filled(kind: FieldType, data: object, now: Callable[[], int]) -> Any:
 def examine(
     kind: FieldType, data: object, hole: Hole = lambda _value, _kind, _path: False
 ) -> list[Problem]:
-    """Return what is wrong with the data; makes nothing.
+    """Return what is wrong with the data; make nothing.
 
     `hole` is asked first about each value but a mapping, with the type it must have: True means
     that the value is settled there (a variable, whose type the caller checks).
@@ -123,7 +124,7 @@ def to_plain(message: object) -> Any:
 
 
 def dotted(path: Iterable[str | int]) -> str:
-    """Write a path as ``pose.position.x``, as everywhere."""
+    """Write a path as ``pose.position.x``."""
     return ".".join(str(part) for part in path)
 
 
@@ -131,14 +132,14 @@ class _Filler:
     """Walks type and data together; collects problems instead of raising at the first."""
 
     def __init__(self, now: Callable[[], int], hole: Hole | None = None) -> None:
-        """With a `hole` only the problems count: what it stands for is not there yet."""
+        """Take a clock; with a `hole`, whose values are not there yet, only the problems count."""
         self.problems: list[Problem] = []
         self._now = now
         self._hole = hole
         self._owner: type | None = None
 
     def convert(self, kind: FieldType, value: object, path: Path) -> Any:
-        """Return what the field has to hold; None where that is settled elsewhere, or wrong."""
+        """Return the value for the field; None for one that is settled elsewhere, or wrong."""
         hole = None if isinstance(value, dict) else self._hole
         if hole is not None and hole(value, kind, path):
             return None
@@ -177,7 +178,7 @@ class _Filler:
         return message
 
     def _convenience(self, cls: type, value: object, path: Path) -> object:
-        """Return the fields of a time, a duration or a quaternion that were written otherwise."""
+        """Return the fields of a time, a duration or a quaternion in a short form."""
         name = interface_name(cls)
         if name == "builtin_interfaces/msg/Time":
             return time_of(value, self._now)
@@ -227,7 +228,7 @@ class _Filler:
 
 
 def _numbers(name: str, items: Any) -> array.array[Any] | None:
-    """Return numbers as rosidl keeps them, checked in C; None for numbers that need a loop."""
+    """Return numbers in rosidl's form, checked in C; None for numbers that need a loop."""
     if isinstance(items, array.array):
         return items
     kinds = set(map(type, items))
@@ -259,7 +260,7 @@ def _number(name: str, value: Any) -> object:
 
 
 def show(value: object) -> str:
-    """Return a value as messages show it: as it is written in YAML where that is short."""
+    """Return a value in the form of messages: as in YAML where that is short."""
     if isinstance(value, Mapping):
         return "a mapping"
     if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""The actions, services and messages that are installed, and their Python classes by name.
+"""The installed actions, services and messages, and their Python classes by name.
 
 Imports no rclpy, and imports a package only after seeing that it holds interfaces.
 """
@@ -22,13 +22,13 @@ Kind = Literal["action", "srv", "msg"]
 _WORDS = {"action": "action", "srv": "service", "msg": "message"}
 PARTS: dict[str, Kind] = {"Goal": "action", "Result": "action", "Feedback": "action",
                           "Request": "srv", "Response": "srv"}  # fmt: skip
-"""The messages that an interface consists of, and of which kind it is then."""
+"""The parts of an interface, with the kind of interface that has them."""
 _NAME = re.compile(r"([a-z][a-z0-9_]*)/(?:(action|srv|msg)/)?([A-Za-z][A-Za-z0-9_]*)")
-"""Of a type: its package, its kind where that is said, and what it is called there."""
+"""The package of a type, its kind where the name has one, and the short name."""
 
 
 class UnknownInterface(LookupError, ValueError):
-    """No such interface is installed; the text says which package is missing or what it has."""
+    """An interface that is not installed; the text says which package is missing or what it has."""
 
 
 class TwoTypes(TypeError):
