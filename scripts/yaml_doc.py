@@ -43,7 +43,7 @@ EXAMPLES = ROOT / "examples"
 RULES_FILE = "bt_actions/document/findings/rules.py"
 
 FUNCTIONS = {
-    "len": "`len($list)` | how many items, characters or keys there are",
+    "len": "`len($list)` | the number of items, characters or keys",
     "abs": "`abs($x)` | a number without its sign",
     "min": "`min($list)`, `min($a, $b)` | the least number or text",
     "max": "`max($list)`, `max($a, $b)` | the greatest number or text",
@@ -52,9 +52,9 @@ FUNCTIONS = {
     "int": "`int($x)` | a number without its fraction; the whole number that a text holds",
     "float": "`float($x)` | the number that a text holds",
     "str": "`str($x)` | a number, true or false as a text",
-    "known": "`known($x)`, `known($door.data)` | whether there is a value; it never fails",
+    "known": "`known($x)`, `known($door.data)` | whether there is a value; never fails",
 }
-"""How each function of expressions is called, and what it gives."""
+"""The calls and the values of each function of expressions."""
 ROWS = "\n".join(f"| {FUNCTIONS[name]} |" for name in ARGUMENTS)
 
 HEAD = f"""\
@@ -71,16 +71,17 @@ completion in editors. The files on this page are in `examples/`.
 ## Rules
 
 - A node is a mapping with **exactly one key that is a kind or the name of an action** that the tree
-  declares. The order of keys is free. The kind's value is the node's name, without a colon, where
-  its section says so; for the others it is what they do, and `name:` is optional.
+  declares. The order of keys is free. The section of a kind says whether the kind's value is the
+  node's name, which has no colon; the value of any other kind says what the node does, and `name:`
+  is optional.
 - `timeout` and `retry` are settings of an action, and kinds only beside `child:`.
-- Unknown keys, keys that are there twice and values of the wrong form are errors.
+- Unknown keys, double keys and values of the wrong form are errors.
 - Scalars are those of YAML 1.2: `on` and `yes` are texts, U+2028, U+2029 and U+0085 end no line,
-  and in double quotes the two halves that JSON writes (`"\\ud83d\\ude00"`) are one character. Files
-  are read with libyaml, which PyYAML's wheels hold.
+  and in double quotes the two halves that JSON writes (`"\\ud83d\\ude00"`) are one character.
+  libyaml reads the files; PyYAML's wheels hold it.
 - Durations carry a unit ({", ".join(f"`{unit}`" for unit in DURATION_UNITS)}); a bare number is
-  seconds, with a warning from 500 on. Deadlines and pauses are never negative. Where a limit can be
-  left out, `none` says so.
+  seconds, with a warning from 500 on. Deadlines and pauses are never negative. `none` is no limit,
+  where a limit can be left out.
 - Numbers and durations are plain, so that deadlines can be checked before a robot moves; where
   `$name` may stand for one, the tables say "or `$name`".
 
@@ -90,31 +91,31 @@ completion in editors. The files on this page are in `examples/`.
 |---|---|
 | `$name`, `$name.field.0` | the value, with its type |
 | `Part $(name)` | a text with the value in it |
-| `= $a + 1` | computed when it is needed |
+| `= $a + 1` | an expression, computed on demand |
 | `$$` | a dollar sign |
-| `"@points.yaml"` | what the file holds, beside the tree: for large values (.yaml, .yml, .json) |
+| `"@points.yaml"` | the data in a file beside the tree: for large values (.yaml, .yml, .json) |
 
-A tree sees only its own names: inputs, outputs, topics, and what its nodes `save`, `set` or loop
-over. A subtree gets what `with` passes and gives back outputs by `save`; each visit begins without
-what the one before it wrote, but for what stands below a `run_once`, and an output that it does not
-give leaves the name as it was. A variable that has no value yet makes a goal INVALID_GOAL and a
-check FAILURE, and says so; a `log` has `(no value)` in its place. `known($name)` asks for it.
+A tree sees only its own names: inputs, outputs, topics, and the names that its nodes `save`, `set`
+or loop over. A subtree gets the values that `with` passes and gives back outputs by `save`. Each
+visit of a subtree begins without the values of the visit before, but for those written below a
+`run_once`; an output without a value leaves the outer name as it was. A variable without a value
+makes a goal INVALID_GOAL and a check FAILURE, with the reason; a `log` has `(no value)` in its
+place. `known($name)` asks whether there is one.
 
 Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, `int8` to `int64`,
 `uint8` to `uint64`, any `package/msg/Name`, and lists of them: `float64[]`, `float64[3]`,
 `float64[<=3]`. A whole number is a fine float; a fraction is no whole number. Goals and messages
-may hold `.inf` and `.nan`; inputs are finite. A mapping that is written out
-(`set: {{stop: {{at: 2.0}}}}`, the items of a `for_each`) has the keys that it was written with
-(`$stop.at`), and may fill a message.
-The names of nodes are taken as they stand: a variable in one is shown as it is written.
+may hold `.inf` and `.nan`; inputs are finite. A mapping in a tree (`set: {{stop: {{at: 2.0}}}}`,
+the items of a `for_each`) has the keys that are written there (`$stop.at`), and may fill a message.
+Names of nodes stand as they are: a `$name` in one is not replaced.
 
 Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices and
 slices (`$list[-1]`, `$list[1:3]`), `1 if $empty else 2`, `true` and `false`, and constants
 (`MoveRobot.Result.STATUS_FAULT`). A plus sign also joins two texts, and two lists:
 `= $names + ['part ' + str($count)]`. In `expect`, `save` and `when` the bare name `result` is the
-result, and of a `run_tree` `outputs` what its tree gave; in `until` and `save` of
+result, and `outputs` of a `run_tree` has the outputs of its tree; in `until` and `save` of
 `wait_for_message`, `message` is the message. A float32 is read as the shortest number that
-gives it: 0.7, not 0.699999988. The functions are:
+stands for it: 0.7, not 0.699999988. The functions are:
 
 | function | gives |
 |---|---|
@@ -153,7 +154,7 @@ FIRST_MET = {
     "BT202": "declare the variable under `inputs` or `topics`, or `save` or `set` one before",
     "BT203": "`bt-actions interfaces show TYPE` has the fields",
     "BT205": "build the package ([interfaces.md](interfaces.md)), or source its workspace",
-    "BT301": "give the action a `timeout`; without one a lost robot is waited for for ever",
+    "BT301": "give the action a `timeout`; without one the tree waits for a lost robot for ever",
     "BT306": "leave `memory: false` away",
 }
 """The rules that beginners meet, and the remedy of each in a line."""
@@ -169,17 +170,17 @@ The key is a name under `actions`, its value the node's name.
 """
 ALIAS_EXAMPLE = "move: To the part\ngoal: {distance: 2.0}\nretry: 3"
 IMPORT = """\
-`actions`, `topics`, `kinds` and `defaults` from other files. They are found as subtrees are: below.
-A `$name` in them is a variable of the tree that uses them, and is checked there."""
+`actions`, `topics`, `kinds` and `defaults` from other files, which are found as subtrees are. A
+`$name` in such a file is a variable of the importing tree, and is checked there."""
 WHERE = """\
 ## Where trees are found
 
-`subtree:` and `import:` take a path beside the file they stand in, `bt-actions` and `load_tree`
-one from the current folder; `.yaml` and `.yml` may be left out. A name without a folder that is not
-there is looked for among the installed trees, in this order: the folders of `BT_ACTIONS_TREE_PATH`
-(separated as in `PATH`), the trees of bt_actions, and `share/PACKAGE/trees` of every package of the
-ROS workspaces that are sourced. There a package of yours installs its trees, with its `setup.py` or
-CMakeLists.txt; `package://PACKAGE/trees/NAME.yaml` names one of a certain package.
+`subtree:` and `import:` take a path beside their own file, `bt-actions` and `load_tree` one from
+the current folder; `.yaml` and `.yml` may be left out. A name without a folder, and without a file
+there, stands for an installed tree. The search goes in this order: the folders of
+`BT_ACTIONS_TREE_PATH` (separated as in `PATH`), the trees of bt_actions, and `share/PACKAGE/trees`
+of every package in the sourced ROS workspaces. A package of yours installs its trees there, with
+its `setup.py` or CMakeLists.txt; `package://PACKAGE/trees/NAME.yaml` names a tree of one package.
 """
 BUSY = """\
 What to do when the goal's server, or one of its `resources`, is taken by another goal of this
@@ -189,19 +190,19 @@ process:
 |---|---|
 """
 ON_CHANGE = """\
-While the goal executes, its fields are computed anew at each tick. Where they differ from what was
-sent (`now` apart):
+While the goal executes, its fields are computed anew at each tick. Where they differ from those of
+the sent goal (`now` apart):
 
 | | |
 |---|---|
 | `ignore` | nothing is done |
 | `replace` | the new goal is sent at once; the old one is canceled after `timeout.cancel` |
-| `cancel` | the goal is canceled, and the new one is sent when that has ended |
+| `cancel` | the goal is canceled, and the new one is sent after its end |
 
 The node stays RUNNING, and the end of the newest goal alone counts. `timeout.result` runs on, and
-no attempt is used. A goal that cannot be built is not sent, and the old one runs on; one that is
-refused ends the attempt, and the old goal is canceled. Changes while a goal is being sent, or while
-a replaced one has to end, wait, and the newest counts: two goals live at once at most. On a
+no attempt is used. A goal that cannot be built is not sent, and the old goal runs on; a refused
+goal ends the attempt, and the old goal is canceled. A change while a goal is being sent, or while a
+replaced goal has to end, waits, and the newest change counts: two goals live at once at most. On a
 `subtree`, `on_change: pass` hands changed inputs on.
 """
 QOS = """\
@@ -211,40 +212,40 @@ QOS = """\
 |---|---|
 | `default` | reliable, the last 10 messages, none from before the subscription |
 | `sensor` | best effort, the last 5 messages: ROS's profile for sensor data |
-| `latched` | reliable, and who subscribes later is given the last message |
+| `latched` | reliable, and a later subscriber gets the last message |
 | `best_effort` | as `default`, but best effort |
 | `services` | ROS's profile for services |
 
 A subscription that asks for more than its publisher offers hears nothing: `default` and `latched`
-of a best effort publisher, `latched` of one that keeps nothing.
+of a best effort publisher, `latched` of a publisher that keeps nothing.
 """
 OWN_KINDS = """\
-Classes of one's own, used as kinds: `shorten: A metre` with `with: {path: $path}`, `save: {short:
+Classes of your own, used as kinds: `shorten: A metre` with `with: {path: $path}`, `save: {short:
 path}`, and `child` or `children`. A class is a behaviour of py_trees that is made with its name,
-and its `child` or `children`. It reads `self.inputs.path`, which is computed when it is read, and
-sets `self.outputs.path`; what it has set is written when its visit ends, all or none. Where an
+and its `child` or `children`. The class reads `self.inputs.path`, which is computed at that moment,
+and sets `self.outputs.path`; outputs are written at the end of the visit, all or none. Where an
 input has no value, or an output does not fit, the node fails."""
 TOPICS = """\
-The latest message of a topic, read as a variable. While the first one may still be on its way (the
-process is younger than 3.5 s, or subscribed less than a second ago to a publisher that is there), a
-node that reads it is `RUNNING`; afterwards it counts as missing, and a check fails. So does
-`check: not $door.data` then; an `invert` around `check: $door.data` succeeds: its child failed.
-What is to be done while nobody knows begins with `check: not known($door)`."""
+The latest message of a topic, read as a variable. While the first message may still be on its way
+(the process is younger than 3.5 s, or subscribed less than a second ago to a publisher that is
+there), a node that reads the topic is `RUNNING`; afterwards the message counts as missing, and a
+check fails. So does `check: not $door.data` then; an `invert` around `check: $door.data` succeeds:
+its child failed. A branch for a topic without a message begins with `check: not known($door)`."""
 DEFAULTS = """\
-`timeout`, `retry` and `busy` for all actions. They merge key by key, and the nearest wins: the
-node's own, the action's under `actions`, the tree's `defaults`, those that it imports."""
+`timeout`, `retry` and `busy` for all actions. Settings merge key by key, and the nearest wins: the
+node's own, the action's under `actions`, the tree's `defaults`, the imported `defaults`."""
 NAMESPACE = """\
-Names of actions, services and topics are relative where they begin without a slash. Before one go
-the namespaces of the node, of the trees and subtrees around it, and its own.
+Names of actions, services and topics are relative where they begin without a slash. The namespaces
+of the node, of the trees and subtrees around it, and its own go before a relative name.
 
-`$(robot)` in a name, or in a namespace, is an input of type string: `server: $(robot)/move`. It has
-to be known before the tree runs: an input of the tree that is run, or of a subtree whose `with`
+`$(robot)` in a name, or in a namespace, is an input of type string: `server: $(robot)/move`. Its
+value has to be known before the tree runs: an input of the root tree, or of a subtree whose `with`
 gives a constant or such an input."""
 LEFT_OUT = """\
-Both may stand beside any kind. A node is left out where `only_if` is false as it begins, where
-`only_while` is false before a tick (what runs below is stopped, and the node is `RUNNING` until the
-goals of that have ended), and where all of its children were left out. Its parent goes on as if the
-node were not there:
+Both may stand beside any kind. A node is left out where `only_if` is false at its begin, where
+`only_while` is false before a tick (the nodes that run below are stopped, and the node is `RUNNING`
+until their goals have ended), and where all of its children were left out. Its parent goes on as if
+the node were not there:
 
 | parent | does |
 |---|---|
@@ -258,8 +259,8 @@ node were not there:
 
 A gate waits as a `check` does while the first message of a topic may come. Afterwards a condition
 that cannot be computed fails the node: `known($door)` asks for a value. py_trees has no status for
-a node that is left out: it is SUCCESS below a sequence, FAILURE below a fallback, and its message
-says so (`left out: $near is false`).
+a node that is left out: its status is SUCCESS below a sequence and FAILURE below a fallback, with
+the reason as its message (`left out: $near is false`).
 """
 SHOWN = {"if": "recovering", "pipeline": "following"}
 """The examples that stand below the last of their kinds."""
@@ -271,7 +272,7 @@ TITLES = {
 
 
 def table(keys: Iterable[Key]) -> list[str]:
-    """A table of keys."""
+    """Return a table of keys."""
     lines = ["| key | value | meaning | default |", "|---|---|---|---|"]
     for key in keys:
         words = form(key.shape).replace("|", "\\|")
@@ -281,7 +282,7 @@ def table(keys: Iterable[Key]) -> list[str]:
 
 
 def form(shape: Shape) -> str:
-    """What a shape says of itself."""
+    """Return the words of a shape."""
     words = shape.words.rstrip(",")
     if getattr(shape, "single", False):
         words = f"{words}, or one item of it"
@@ -291,23 +292,23 @@ def form(shape: Shape) -> str:
 
 
 def example(name: str) -> str:
-    """A tree in examples/, which a test runs."""
+    """Return a tree in examples/, which a test runs."""
     text = (EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8")
     return f"```yaml\n{text}```"
 
 
 def record(title: str, text: str, shape: Record) -> list[str]:
-    """A section about a mapping that stands in several places."""
+    """Return a section about a mapping that stands in several places."""
     return [f"### {title}", "", text, "", *table(shape.keys.values())]
 
 
 def part(title: str, text: str, *names: str) -> list[str]:
-    """A section about a part of a file, with examples."""
+    """Return a section about a part of a file, with examples."""
     return [f"### {title}", "", text, "", *(line for name in names for line in (example(name), ""))]
 
 
 def section(kind: Kind) -> list[str]:
-    """The section of a kind."""
+    """Return the section of a kind."""
     value = "the node's name" if kind.named_by_value else form(kind.value)
     own = [key for name, key in kind.keys.items() if name not in GATES]
     return [
@@ -318,13 +319,13 @@ def section(kind: Kind) -> list[str]:
 
 
 def busy() -> list[str]:
-    """The rows of the table of what to do while the server is taken."""
+    """Return the rows about a goal whose server is taken."""
     words = dict(attribute_docs(Busy))
     return [f"| `{busy.value}` | {words[busy.name]} |" for busy in Busy]
 
 
 def attribute_docs(cls: type) -> Iterator[tuple[str, str]]:
-    """The names of a class's attributes, with the text that stands below each."""
+    """Yield the names of a class's attributes, with the text below each."""
     (body,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
     assert isinstance(body, ast.ClassDef)
     for assigned, text in itertools.pairwise(body.body):
@@ -334,21 +335,21 @@ def attribute_docs(cls: type) -> Iterator[tuple[str, str]]:
 
 
 def retry_text() -> str:
-    """What retrying means, with the outcomes that count where none are named."""
+    """Return the meaning of a retry, with the outcomes that count by default."""
 
     def listed(outcomes: Iterable[str]) -> str:
         *most, last = (f"`{outcome}`" for outcome in sorted(outcomes))
         return f"{', '.join(most)} and {last}"
 
     return (
-        "`3` is short for `{attempts: 3}`. Tried again are, where `outcomes` does not say "
-        f"otherwise, {listed(RETRIED_BY_DEFAULT)}. {listed(RETRIED_IF_NAMED)} have to be named: "
-        "the goal may have been executed. What each means: [goal.md](goal.md#outcomes-and-ends)."
+        "`3` is short for `{attempts: 3}`. Without `outcomes`, another attempt follows "
+        f"{listed(RETRIED_BY_DEFAULT)}. {listed(RETRIED_IF_NAMED)} have to be named: the goal may "
+        "have been executed. [goal.md](goal.md#outcomes-and-ends) explains each."
     )
 
 
 def yaml_page() -> str:
-    """docs/yaml.md."""
+    """Return docs/yaml.md."""
     head = re.sub(
         r"^@(\w+)$", lambda match: example(match[1]), HEAD.rstrip("\n"), flags=re.MULTILINE
     )
@@ -387,7 +388,7 @@ def yaml_page() -> str:
 
 
 def rules_page() -> str:
-    """docs/rules.md."""
+    """Return docs/rules.md."""
     lines = [
         "# The rules of `bt-actions check`", "",
         f"<!-- Made by scripts/yaml_doc.py from {RULES_FILE}. Do not edit. -->", "",

@@ -60,7 +60,7 @@ _OUTCOMES = ListOf(Choice(tuple(sorted(outcome.value for outcome in RETRYABLE)))
 _WHEN = Key("when", Condition(RESULT), "Try again only if this holds for the result.")
 RETRY = Record(
     "a number of attempts or a mapping",
-    keyed(*_TRIES, Key("outcomes", _OUTCOMES, "After which outcomes to try again."), _WHEN),
+    keyed(*_TRIES, Key("outcomes", _OUTCOMES, "Outcomes that another attempt follows."), _WHEN),
     short="attempts",
 )
 SERVICE_TIMEOUT = Record(
@@ -76,7 +76,7 @@ NAMESPACE = RosName("a namespace", namespace=True)
 POLICIES = (
     Key("timeout", TIMEOUT, "How long each phase may take; a bare duration is the result's."),
     Key("retry", RETRY, "How often to try; a bare number is the attempts."),
-    Key("busy", Choice(tuple(busy.value for busy in Busy)), "What to do while the server is taken.",
+    Key("busy", Choice(tuple(busy.value for busy in Busy)), "The reaction to a taken server.",
         default="wait"),
 )  # fmt: skip
 FAILED = frozenset({"result", "outcome"})
@@ -89,19 +89,19 @@ DOING = (
     Key("until", Condition(frozenset({"feedback"})),
         "Where this holds for the feedback, the goal is canceled, and that is a success."),
     Key("on_change", Choice(("ignore", "replace", "cancel")),
-        "What to do where the fields are others than were sent, while the goal executes.",
+        "The reaction to changed fields while the goal executes.",
         default="ignore"),
     *POLICIES,
-    Key("expect", Condition(RESULT), "What the result must be, beyond the server's word."),
+    Key("expect", Condition(RESULT), "A condition on the result, beyond the server's word."),
     Key("save", Table(Place(RESULT)), "Names to keep parts of the result under."),
     SAVE_ON_FAILURE,
     Key("resources", ListOf(Text("a text")),
-        "What the goal occupies, in place of its server; named as servers are.",
+        "The goal's resources, in place of its server; named as servers are.",
         default="the server's name"),
     Key("namespace", NAMESPACE, "Put before a relative name of a server or resource."),
 )  # fmt: skip
 GATES = keyed(
-    Key("only_if", Condition(), "Leave the node out where this is false as it begins."),
+    Key("only_if", Condition(), "Leave the node out where this is false at its begin."),
     Key("only_while", Condition(),
         "Leave the node out where this is false before any tick; what runs is stopped."),
 )  # fmt: skip
@@ -115,7 +115,7 @@ ACTION_NAME = Key("server", ACTION_SERVER, "The action's name.", required=True,
                   example="move_robot")  # fmt: skip
 MESSAGE_TYPE = Key("type", TypeName("msg"), "The message's type.", required=True,
                    example="std_msgs/msg/Bool")  # fmt: skip
-_VALUE_TYPE = Key("type", TypeName("value"), "What the value is.", required=True, example="float64")
+_VALUE_TYPE = Key("type", TypeName("value"), "The value's type.", required=True, example="float64")
 ALIAS = Record(
     "an action: its type, server and settings",
     keyed(ACTION_TYPE, ACTION_NAME, *DOING),
@@ -152,10 +152,10 @@ TOPIC = Record(
     keyed(
         Key("topic", TOPIC_NAME, "The topic's name.", required=True, example="door"),
         MESSAGE_TYPE,
-        Key("qos", QOS, "How it is subscribed to.", default="default"),
+        Key("qos", QOS, "The quality of service of the subscription.", default="default"),
         Key("max_age", Duration(or_none=True), default="none",
             doc="A value older than this, by the node's clock, counts as missing."),
-        Key("default", AnyValue(), "What is read where there is no value; no node waits for one."),
+        Key("default", AnyValue(), "The value before the first message; no node waits for one."),
         Key("namespace", NAMESPACE, "Put before a relative topic name."),
     ),
 )  # fmt: skip
@@ -163,16 +163,16 @@ OWN_KIND = Record(
     "a kind: its class",
     keyed(
         Key("python", Text("a class, such as package.module.Class, as a text"),
-            "A behaviour of py_trees, made with its name and what it holds.", required=True,
+            "A behaviour of py_trees, made with its name and its children.", required=True,
             example="my_robot.paths.Shorten"),
-        Key("inputs", Table(INPUT), "What it reads as `self.inputs.name`, computed when read."),
-        Key("outputs", Table(OUTPUT), "What it sets as `self.outputs.name`, written at its end."),
-        Key("children", Choice(("none", "one", "many")), "What it holds.", default="none"),
+        Key("inputs", Table(INPUT), "Values that the class reads as `self.inputs.name`."),
+        Key("outputs", Table(OUTPUT), "Values that the class sets as `self.outputs.name`."),
+        Key("children", Choice(("none", "one", "many")), "The child nodes.", default="none"),
     ),
     short="python",
 )  # fmt: skip
 DEFAULTS = Record("a mapping of settings", keyed(*POLICIES))
-_DESCRIPTION = Key("description", Text(), "What it is for.")
+_DESCRIPTION = Key("description", Text(), "The tree's purpose.")
 _IMPORT = Key("import", ListOf(Text("a path, as a text"), single=True), "Files with more of these.")
 _SHARED = (
     Key("actions", Table(ALIAS), "This tree's words for the actions it uses."),
@@ -216,7 +216,7 @@ TOP_KEYS = keyed(
     _DESCRIPTION,
     _IMPORT,
     Key("namespace", NAMESPACE, "Put before all relative names of the tree."),
-    Key("inputs", Table(INPUT), "Values that whoever runs the tree gives."),
+    Key("inputs", Table(INPUT), "Values from the caller of the tree."),
     Key("outputs", Table(OUTPUT), "Values that the tree gives back."),
     *_SHARED,
     Key("root", NODE, "The root node.", required=True, example="{success: Done}"),

@@ -186,9 +186,9 @@ class Kind:
 
 
 NAME = Key("name", NodeName(), "The node's name, where the kind's value does not say enough.")
-_CHILDREN = Key("children", NODES, "The nodes it holds.", required=True,
+_CHILDREN = Key("children", NODES, "The child nodes.", required=True,
                 example="[{success: First}, {success: Second}]")  # fmt: skip
-_CHILD = Key("child", NODE, "The node it holds.", required=True, example="{success: Done}")
+_CHILD = Key("child", NODE, "The child node.", required=True, example="{success: Done}")
 
 KINDS: dict[str, Kind] = {}
 """Every kind of node, by its key; `document/kinds/` fills the table once, at its import."""

@@ -52,16 +52,16 @@ _SEMANTICS = """
 | cannot be computed | FAILURE |
 | RUNNING | RUNNING; nothing is stopped |
 
-Whether a branch fails does not bring the other one. With `memory: false` the other branch begins
-when the goals of what was stopped have ended.
+A failure of one branch does not begin the other. With `memory: false` the other branch begins when
+the stopped goals have ended.
 """
 KIND = Kind(
     "if", Group.COMPOSITE, ConditionOrNode(),
-    "Ticks `then` or `else`, as a condition says, and ends as that does. The condition is an "
+    "Ticks `then` or `else`, by a condition, and ends as that branch does. The condition is an "
     "expression, or a node that succeeds or fails.",
     keyed(
-        Key("then", NODE, "What to do where it holds.", required=True, example="{success: Go}"),
-        Key("else", NODE, "What to do where it does not.", default="fails"),
+        Key("then", NODE, "The node for a true condition.", required=True, example="{success: Go}"),
+        Key("else", NODE, "The node for a false condition.", default="fails"),
         Key("memory", Flag(), default="true",
             doc="Whether the choice is kept until the node ends; false asks before each tick, and "
             "stops what is not chosen any more."),

@@ -85,8 +85,8 @@ that fails. Without `fails_after` the node fails when too few can succeed any mo
 """
 KIND = composite(
     "parallel",
-    "Ticks its children beside each other. A child that has finished is not started again; "
-    "none is begun once the node has succeeded or failed, which is decided after each.",
+    "Ticks its children side by side. A child that has finished is not started again; no child "
+    "begins once the node has succeeded or failed, which is decided after each child.",
     "parallel: Look and listen\nchildren:\n  - success: Look\n  - success: Listen",
     Key("policy", _POLICY, "How many must succeed; the rest is then stopped.", default="all"),
     build=_build, check=_check, warn=warn_of_resources, ends=_ends, again=End.ANY,

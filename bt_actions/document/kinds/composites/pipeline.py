@@ -49,15 +49,15 @@ _SEMANTICS = """
 |---|---|
 | RUNNING, at the farthest place that was reached or behind it | RUNNING; no later child is ticked |
 | RUNNING, before that place | ticks the next child |
-| SUCCESS | ticks the next child; the last: SUCCESS, and what runs is stopped |
-| FAILURE | FAILURE, and what runs is stopped |
+| SUCCESS | ticks the next child; the last: SUCCESS, and running children are stopped |
+| FAILURE | FAILURE, and running children are stopped |
 
 Children that have succeeded begin again at the next tick, as long as a later one runs: `every` says
 how often. A new visit begins at the first place.
 """
 KIND = composite(
     "pipeline",
-    "Ticks its children in order, and those again that have succeeded, while a later one runs.",
+    "Ticks its children in order; those that have succeeded again, while a later child runs.",
     "pipeline: Follow\nchildren:\n  - every: 1 s\n    child:\n      success: Plan\n"
     "  - success: Follow the plan",
     build=_build, warn=_warn, ends=all_succeed, goes_on=End.SUCCESS, again=End.ANY,

@@ -39,7 +39,7 @@ With `every: none` the child succeeds once until the node has failed, or is stop
 """
 KIND = decorator(
     "every",
-    "Begins its child at once, and again that long after it has succeeded last.",
+    "Begins its child at once, and again so long after the child's last success.",
     "every: 1 s\nchild:\n  success: Plan",
     value=Duration(or_none=True),
     build=_build, warn=_warn, slow=True, goes_on=End.SUCCESS, semantics=_SEMANTICS, paces=True,

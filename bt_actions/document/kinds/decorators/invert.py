@@ -41,7 +41,7 @@ def _warn(hazards: Hazards, node: TreeNode, _bounded: bool) -> None:
 
 KIND = decorator(
     "invert",
-    "Succeeds when its child fails, and fails when it succeeds.",
+    "Succeeds when its child fails, and fails when its child succeeds.",
     "invert: Nobody there\nchild:\n  failure: Somebody",
     build=_build, warn=_warn, goes_on=End.FAILURE,
     ends=lambda _values, inner, _at_once: Can(inner[0].fail, inner[0].succeed),

@@ -42,12 +42,12 @@ _SEMANTICS = """
 | FAILURE | FAILURE |
 | SUCCESS, and `until` is true | SUCCESS |
 | SUCCESS, and `until` cannot be computed | FAILURE |
-| SUCCESS, and it was the last of `times` | SUCCESS; with `until`, FAILURE |
+| SUCCESS in the last of `times` | SUCCESS; with `until`, FAILURE |
 | SUCCESS | RUNNING; the next round begins at the next tick, which comes at once |
 """
 KIND = decorator(
     "repeat",
-    "Ticks its child again when it has succeeded; fails as soon as it fails.",
+    "Ticks its child again after each success; fails with the first failure.",
     "repeat: Three rounds\ntimes: 3\nchild:\n  success: Patrol",
     Key("times", Whole(0, values=True), "All rounds.", default="for ever", example="3"),
     Key("until", Condition(), "Asked after each round that has succeeded: true succeeds."),

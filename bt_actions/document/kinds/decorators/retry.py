@@ -75,13 +75,13 @@ With `recover`:
 """
 KIND = decorator(
     "retry",
-    "Ticks its child again when it has failed.",
+    "Ticks its child again after a failure.",
     "retry: Until it holds\nattempts: 3\nbackoff: 500 ms\nchild:\n  success: Grasp",
     Key("attempts", Whole(1, values=True), "All tries.", default="without limit", example="3"),
     Key("backoff", Duration(zero=True), "The pause before the second try.", default="0 s"),
     Key("factor", Quantity(1.0), "Each pause is this much longer.", default="2"),
     Key("max_backoff", Duration(zero=True), "The longest pause.", default="60 s"),
-    Key("recover", NODE, "What to do after each failure but the last, before the pause."),
+    Key("recover", NODE, "A node for each failure but the last, before the pause."),
     build=_build, check=_check, warn=_warn, ends=_ends, seconds=_seconds, slow=True,
     again=End.FAILURE, semantics=_SEMANTICS,
 )  # fmt: skip

@@ -13,7 +13,7 @@ def _build(node: TreeNode, context: Context, child: Behaviour) -> Behaviour:
 
 KIND = decorator(
     "run_once",
-    "Runs its child to its end once, and keeps to that end ever after.",
+    "Runs its child to an end once, and keeps that end.",
     "run_once: Calibrate first\nchild:\n  success: Calibrate",
     build=_build, goes_on=End.SUCCESS, once=True,
     ends=lambda _values, inner, at_once: EITHER if at_once else inner[0],

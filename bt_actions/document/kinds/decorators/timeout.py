@@ -31,8 +31,8 @@ def _seconds(values: Settings, inner: list[float]) -> float:
 
 KIND = decorator(
     "timeout",
-    "Stops its child after some time, and fails when what it stopped has ended, or did not end "
-    "within its own 'cancel'.",
+    "Stops its child after some time, and fails once the stopped goals have ended, or have not "
+    "ended within their own 'cancel'.",
     "timeout: Ten seconds at most\nafter: 10 s\nchild:\n  success: Search",
     Key("after", Duration(values=True), "How long the child may take.", required=True,
         example="10 s"),

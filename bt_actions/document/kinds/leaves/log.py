@@ -20,9 +20,9 @@ def _check(checker: Checker, node: TreeNode) -> None:
 KIND = leaf(
     "log",
     Text(values=True),
-    "Writes a line to the log. It never fails: `(no value)` stands for what has none.",
+    "Writes a line to the log, and never fails: `(no value)` stands for a missing value.",
     "log: The level is $(level)\nlevel: warn",
-    Key("level", Choice(("debug", "info", "warn", "error", "fatal")), "How grave it is.",
+    Key("level", Choice(("debug", "info", "warn", "error", "fatal")), "The severity.",
         default="info"),
     reads="",  # it never fails
     build=_build, check=_check, ends=lambda _values, _inner, _at_once: SUCCEEDS,

@@ -41,16 +41,16 @@ def _ends(values: Settings, _inner: list[Can], at_once: bool) -> Can:
 KIND = leaf(
     "publish",
     TOPIC_NAME,
-    "Publishes a message. While a process is new (3.5 s), who listens may not be discovered "
-    "yet, so it waits for one until then; where nobody listens it succeeds with a warning.",
+    "Publishes a message. In a new process (3.5 s) subscribers may not be discovered yet, so "
+    "the node waits for one until then; without a subscriber it succeeds with a warning.",
     "publish: lamp\ntype: std_msgs/msg/Bool\nmessage: {data: true}",
     MESSAGE_TYPE,
     Key("message", Values(), "The fields of the message."),
-    Key("subscribers", Whole(1), "So many must listen before it publishes.",
-        default="whoever is there"),
+    Key("subscribers", Whole(1), "The number of subscribers that the node waits for.",
+        default="any number"),
     Key("timeout", Duration(or_none=True), default="none",
-        doc="After which it fails where fewer listen; not while a process is new."),
-    Key("qos", QOS, "How it is published.", default="default"),
+        doc="The wait for subscribers, then FAILURE; not while a process is new."),
+    Key("qos", QOS, "The quality of service of the publisher.", default="default"),
     Key("namespace", NAMESPACE, "Put before a relative name."),
     interface=Interface("msg", "publish", "message"),
     build=_build, check=_check, ends=_ends, slow="subscribers", computes=True,

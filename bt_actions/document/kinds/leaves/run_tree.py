@@ -37,8 +37,8 @@ def _check(checker: Checker, node: TreeNode) -> None:
 KIND = leaf(
     "run_tree",
     NodeName(),
-    "Has a tree run by a server of trees (`bt-actions serve`), and takes over how it ends: "
-    "where the end of a goal of that run is not known, it is not known here either.",
+    "Lets a server of trees (`bt-actions serve`) run a tree, and takes over the end of that "
+    "run: a goal there that is not accounted for leaves the end UNKNOWN here.",
     "run_tree: Fetch the part\ntree: fetch\nserver: /r1/run_tree\ninputs: {pick_at: 2.0}\n"
     "save: {at: outputs.at}",
     Key("tree", Text(values=True), "The tree's name at that server.", required=True,
@@ -48,7 +48,7 @@ KIND = leaf(
     Key("timeout", TIMEOUT, "As for an action, but `cancel` is 15 s where nothing is said: "
         "the run sees its own goals to their ends first."),
     *POLICIES[1:],
-    Key("expect", Condition(_RUN), "What must hold of `result`, or of `outputs`."),
+    Key("expect", Condition(_RUN), "A condition on `result`, or on `outputs`."),
     Key("save", Table(Place(_RUN)), "Names to keep parts of the outputs under."),
     *DOING[-2:],
     reads="inputs",

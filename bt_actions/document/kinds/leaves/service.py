@@ -37,7 +37,7 @@ KIND = leaf(
     Key("request", Values(), "The fields of the request."),
     Key("timeout", SERVICE_TIMEOUT, "How long to wait; a bare duration is the answer's."),
     Key("retry", SERVICE_RETRY, "How often to try; a bare number is the attempts."),
-    Key("expect", Condition(RESULT), "What the answer must be."),
+    Key("expect", Condition(RESULT), "A condition on the answer."),
     Key("save", Table(Place(RESULT)), "Names to keep parts of the answer under."),
     Key("namespace", NAMESPACE, "Put before a relative name."),
     interface=Interface("srv", "server", "request", "Request", "result", "Response"),

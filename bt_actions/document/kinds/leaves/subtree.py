@@ -197,7 +197,7 @@ def _ends(values: Settings, inner: list[Can], at_once: bool) -> Can:
 KIND = leaf(
     "subtree",
     Text("a tree's file or name, as a text"),
-    "Another tree: it sees only what `with` passes, and gives back outputs by `save`.",
+    "Another tree, which sees only the values of `with`, and gives back outputs by `save`.",
     "subtree: recover\nwith: {home: 0.0}",
     Key("with", Values(), "Values for the tree's inputs."),
     Key("on_change", Choice(("ignore", "pass")),

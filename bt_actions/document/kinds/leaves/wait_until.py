@@ -19,6 +19,6 @@ KIND = leaf(
     Condition(),
     "Succeeds as soon as the expression is true.",
     "wait_until: $level > 0.2\ntimeout: 60 s",
-    Key("timeout", Duration(or_none=True), "After which it fails.", default="none"),
+    Key("timeout", Duration(or_none=True), "The time after which the node fails.", default="none"),
     build=_build, slow=True, ends=lambda _values, _inner, at_once: SUCCEEDS if at_once else EITHER,
 )  # fmt: skip
