@@ -41,7 +41,7 @@ __all__ = [  # noqa: RUF022 - grouped by use
     "Timeouts",
     "Retry",
     "Busy",
-    # what became of a goal
+    # outcomes and ends of goals
     "Outcome",
     "End",
     "AttemptRecord",

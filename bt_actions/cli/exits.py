@@ -66,7 +66,7 @@ def refuse_domain() -> None:
     domain = os.environ.get("ROS_DOMAIN_ID", "")
     digits = domain.strip().removeprefix("+").lower()
     base = 16 if digits.startswith("0x") else 8 if digits.startswith("0") else 10  # as rcl reads it
-    with contextlib.suppress(ValueError):  # of which rcl says why
+    with contextlib.suppress(ValueError):  # rcl names the mistake
         if int(digits, base) > HIGHEST_DOMAIN:
             text = f"ROS_DOMAIN_ID is {domain!r}; a domain is a number from 0 to {HIGHEST_DOMAIN}"
             raise BadInput(f"ROS 2 cannot start: {text}")

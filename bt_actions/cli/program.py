@@ -117,7 +117,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         code = Exit.SIGPIPE
     code = code if _flushed() else code or Exit.BAD_INPUT
-    if argv is not None:  # it is called by a program, whose standard output that is again
+    if argv is not None:  # a calling program gets its standard output back
         give_stdout_back()
     return code
 

@@ -178,7 +178,7 @@ def _ports(document: Document) -> Iterator[Table]:
 
 def _fields(message: type, depth: int) -> Iterator[Line]:
     for name, kind in ros_fields.describe(message).items():
-        if name == "structure_needs_at_least_one_member":  # what rosidl puts into an empty one
+        if name == "structure_needs_at_least_one_member":  # rosidl's field of an empty message
             continue
         yield Line(name, str(kind), depth)
         inner = kind.item if isinstance(kind, ros_fields.Listing) else kind

@@ -77,7 +77,7 @@ class Tree:
     ) -> None:
         self._workspace, self._document = workspace, document
         self._types, self._python = types, python
-        self._building = threading.Lock()  # what goes wrong is gathered in the sources
+        self._building = threading.Lock()  # the sources gather findings
 
     def __repr__(self) -> str:
         return f"<Tree {self.name}>"
@@ -275,7 +275,7 @@ def check_source(source: Source, *, types: bool = True, python: bool = True) -> 
 def _checked(workspace: Workspace, *, types: bool, python: Python = True) -> list[Finding]:
     # Libraries first: what is wrong with them by themselves is not told of the trees they are in.
     for document in sorted(workspace.documents, key=lambda one: one.root is not None):
-        with contextlib.suppress(TooManyErrors):  # which are errors of this document: it is refused
+        with contextlib.suppress(TooManyErrors):  # errors of this document, which is refused
             checker = Checker(document, types=types, python=python)
             check_document(checker)
             find_hazards(checker)

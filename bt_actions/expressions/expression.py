@@ -65,7 +65,7 @@ class Expression:
         try:
             self.form = _form("$v".join(parts[::2]), given, constants)
         except ExpressionError:
-            self.form = Form(text, given, constants)  # which says what is wrong, and where
+            self.form = Form(text, given, constants)  # its error has the author's columns
         if len(self.form.variables) != len(self.variables):  # some stand in a text
             self.form = Form(text, given, constants)
             self.variables = tuple(node.id[1:] for node in self.form.variables.values())

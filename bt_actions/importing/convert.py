@@ -45,7 +45,7 @@ def convert(paths: list[Path], mapping: Map | None = None) -> Imported:
         if kind_of(element) in SUBTREES
     }
     waiting = [each for each in project.trees.values() if each.name not in called]
-    waiting = waiting or list(project.trees.values())  # they hold each other
+    waiting = waiting or list(project.trees.values())  # trees that hold each other
     begun: list[Definition] = []
 
     def call(definition: Definition) -> str:

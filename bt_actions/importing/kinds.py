@@ -291,7 +291,7 @@ KINDS: dict[str, Handler] = {
     "WhileDoElse": _if(memory=False),
     "TryCatch": _try,
     "Inverter": _invert,
-    "inverter": _invert,  # so in an example of Nav2's
+    "inverter": _invert,  # an example of Nav2's has this spelling
     "ForceSuccess": _decorator("force_success"),
     "ForceFailure": _decorator("force_failure"),
     "Repeat": _rounds("repeat", "times", "num_cycles", "success"),

@@ -379,7 +379,7 @@ class Project:
         for name, access in inner.accesses.items():
             outer = outer_name(element, inner, name)
             if outer is None and name not in ports and access.startswith("r"):
-                outer = name  # it has no value there, and becomes an input here
+                outer = name  # without a value there: an input here
             if outer is not None:
                 yield from ((outer, each) for each in access)
 

@@ -82,7 +82,7 @@ def escaped(text: str) -> tuple[str, Shifts]:
     """Escape `<` and `&` in quoted attributes, and `&` outside; return what moved."""
     out: list[str] = []
     shifts: Shifts = defaultdict(list)
-    line, start = 1, 0  # of the line, in the new text
+    line, start = 1, 0  # the line's begin in the new text
     length = at = 0
 
     def add(piece: str, more: int = 0) -> None:

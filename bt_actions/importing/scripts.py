@@ -23,7 +23,7 @@ _TOKEN = re.compile(
     r"""|(?P<sign>:=|[-+*/]=|==|!=|<=|>=|&&|\|\||\.\.|[-+*/<>=!~&|^?:;()]))""",
     re.ASCII,
 )
-_BINDING = {  # of ours, the loosest first
+_BINDING = {  # our operators, the loosest first
     word: strength
     for strength, words in enumerate(("if", "or", "and", "not", "== != < <= > >=", "+ -", "* /"))
     for word in words.split()
@@ -106,7 +106,7 @@ def condition(code: str) -> Part:
 
 class _Reader:
     def __init__(self, code: str) -> None:
-        """Split a script into words. Raises ScriptError for a wrong word or a very long statement."""
+        """Split a script into words. Raises ScriptError for a wrong word or a long statement."""
         self._tokens: list[tuple[str, str]] = []
         at, words, code = 0, 0, code.strip()
         while at < len(code):

@@ -100,7 +100,7 @@ class Writer:
                 self.report.tree(element, self.definition.name, Verdict.DIFFERS, why)
         types = {scope[each]: self.project.type_of(each) for each in self.definition.accesses}
         for name in sorted(_read_only(root) - {*inputs, *both, *self.words["topics"]}):
-            kind = types.get(name, "string")  # what would have written it was not imported
+            kind = types.get(name, "string")  # its writer was not imported
             nothing = NOTHING.get(kind, {})
             if name in outputs:
                 both[name] = nothing

@@ -201,7 +201,7 @@ class _Filler:
             items = plain(items)  # numpy's, too
         if not isinstance(items, (list, tuple, array.array)):
             raise ValueError(f"a list of {name} is needed, not {show(value)}")
-        converted: Any = None if self._hole else _numbers(name, items)  # there may be millions
+        converted: Any = None if self._hole else _numbers(name, items)  # maybe millions
         if converted is None:
             converted = [self.convert(kind.item, each, (*path, n)) for n, each in enumerate(items)]
         if kind.size is not None and len(items) != kind.size:

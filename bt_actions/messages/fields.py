@@ -117,7 +117,7 @@ def _type(slot: Any) -> FieldType:
 
     if isinstance(slot, idl.BasicType):
         return Scalar(_NAMES.get(slot.typename, slot.typename))
-    limit = getattr(slot, "maximum_size", None)  # of what is bounded
+    limit = getattr(slot, "maximum_size", None)  # the bound, where there is one
     if isinstance(slot, idl.AbstractGenericString):
         return Scalar("wstring" if isinstance(slot, idl.AbstractWString) else "string", limit)
     if isinstance(slot, idl.AbstractNestedType):

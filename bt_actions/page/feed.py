@@ -136,7 +136,7 @@ class _Feed:
             if at.number <= self.number:
                 continue
             events.append(known(item) if isinstance(item, State) else to_plain(item))
-            if isinstance(item, EventsLost):  # which has the number of what follows
+            if isinstance(item, EventsLost):  # its number is that of the next event
                 continue
             last = at.number
             if len(events) >= MOST:

@@ -116,7 +116,7 @@ def _understood() -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:  # rclpy's RCLError
-        if type(error).__name__ == "UnknownROSArgsError":  # whose text is a list of Python's
+        if type(error).__name__ == "UnknownROSArgsError":  # its text is a list of Python's
             unknown = shlex.join(ast.literal_eval(str(error)))
             remedy = "options of bt-actions stand before --ros-args"
             if ":=" in unknown:

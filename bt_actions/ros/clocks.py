@@ -27,7 +27,7 @@ class Clocks:
         self._simulated = False
         self._offset = 0.0
         self._last = time.monotonic()
-        self._warn_at = 0.0  # that nothing has come on /clock; 0: it is not waited for yet
+        self._warn_at = 0.0  # of a silent /clock; 0: no wait yet
 
     def now(self) -> Now:
         """Return this moment."""

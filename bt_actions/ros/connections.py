@@ -47,7 +47,7 @@ def qos_profile(name: str) -> QoSProfile:
         "best_effort": QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT),
         "services": qos_profile_services_default,
         "events": QoSProfile(depth=100),
-        "rosout": QoSProfile(  # that of rclpy's loggers
+        "rosout": QoSProfile(  # the profile of rclpy's loggers
             depth=1000,
             durability=DurabilityPolicy.TRANSIENT_LOCAL,
             lifespan=Duration(seconds=10),

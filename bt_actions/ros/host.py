@@ -57,7 +57,7 @@ class RosHost:
     def appears(self) -> None:
         """Take note that this process begins to see others now; the caller holds the lock."""
         if self._thread is None:
-            self.stalls.lives(self.steady())  # who was there before has rested until now
+            self.stalls.lives(self.steady())  # the process has rested until now
             self.stalls.rests(self.steady())
 
     def disown(self) -> None:

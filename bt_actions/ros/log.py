@@ -46,7 +46,7 @@ class _StandardError(logging.Handler):
         while left:
             try:
                 left = left[os.write(STDERR, left) :]
-            except BlockingIOError:  # whoever shares the terminal has made it so
+            except BlockingIOError:  # another owner of the terminal made it so
                 _has_room()
             except OSError:  # nobody will ever read it
                 return
@@ -65,7 +65,7 @@ class Log:
         self.error = lambda text: self._put(self._logger.error, clean(fit(text, LINE)))
         self._begin()
         atexit.register(self.flush)
-        os.register_at_fork(after_in_child=self._begin)  # what waits is the parent's to write
+        os.register_at_fork(after_in_child=self._begin)  # waiting lines are the parent's
 
     def _begin(self) -> None:
         self._lines: queue.Queue[Callable[[], object]] = queue.Queue(MOST)

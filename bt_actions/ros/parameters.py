@@ -67,7 +67,7 @@ def _shown(
     its_type = Parameter.Type[_SINGLE.get(scalar, "STRING") + ending]
     if not scalar or (limits and max(values, default=0) > _MOST):
         limits, its_type = None, Parameter.Type.STRING
-        value = as_json(value)  # which is YAML, and quick for many points
+        value = as_json(value)  # JSON is YAML, and quick for many points
     descriptor = ParameterDescriptor(
         description=description,
         additional_constraints=f"{kind}; fixed while the tree runs",

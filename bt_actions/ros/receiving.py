@@ -30,7 +30,7 @@ os.register_at_fork(after_in_child=_receivers.clear)  # their threads are the pa
 
 
 class Receiver:
-    """The thread of a node's transports, while there are any; no client is destroyed in its wait."""
+    """The thread of a node's transports; no client is destroyed during its wait."""
 
     def __init__(self, node: Node) -> None:
         self._node, context = node, node.context

@@ -117,7 +117,7 @@ class Rediscovery:
             _bell.notify_all()
         if self._thread is None or not self._thread.is_alive():
             thread = threading.Thread(target=self._run, name="bt_actions-rediscovery", daemon=True)
-            with contextlib.suppress(RuntimeError):  # there can be no more
+            with contextlib.suppress(RuntimeError):  # no more threads are possible
                 thread.start()
                 self._thread = thread
 
@@ -198,7 +198,7 @@ class Rediscovery:
                 time.sleep(GLANCE)
         finally:
             with host.lock:
-                for transport in tried.values():  # which nobody took
+                for transport in tried.values():  # unused ones
                     transport.close()
         return bool(second.users)
 

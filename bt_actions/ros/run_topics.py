@@ -104,7 +104,7 @@ class RunTopics:
                     self._events.publish(run.message(event, told))
                 if isinstance(event, RunEnded):
                     self._over(run)
-                time.sleep(0)  # whoever waits for Python's lock is next
+                time.sleep(0)  # a thread that waits for Python's lock is next
         if watched and now >= self._due:
             self._due = math.inf
             states = [run.standing() for run in self._runs if run.state.began is not None]

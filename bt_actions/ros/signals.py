@@ -78,7 +78,7 @@ class _Watch:
     def __init__(self) -> None:
         self._received: list[int] = []
         self._interrupts: list[Interrupt] = []
-        self._before: dict[int, Any] = {}  # what signal.getsignal returns
+        self._before: dict[int, Any] = {}  # the type of signal.getsignal
         self._rclpys = _rclpys()
         self._is_over = False
 
@@ -93,7 +93,7 @@ class _Watch:
 
     def take_off(self) -> None:
         """Put all handlers back: SIGINT's last of Python's, as it brings KeyboardInterrupt back."""
-        meanwhile = _rclpys()  # what an rclpy.init() has put on
+        meanwhile = _rclpys()  # handlers of an rclpy.init()
         if meanwhile:
             uninstall_signal_handlers()
         # Over which the program has set one of its own, rclpy counts its own as set for ever.
@@ -106,7 +106,7 @@ class _Watch:
 
     def put_back(self) -> None:
         for number in reversed(self._before):
-            if signal.getsignal(number) == self._note:  # else the program has set its own since
+            if signal.getsignal(number) == self._note:  # else a newer one is the program's
                 signal.signal(number, self._before[number])
 
     @contextlib.contextmanager

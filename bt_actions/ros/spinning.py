@@ -89,7 +89,7 @@ class Spinner:
                 name = node.get_fully_qualified_name()
                 raise ValueError(f"node {name} is in another executor than the one given")
             else:
-                given = node.executor  # whose owner spins it
+                given = node.executor  # its owner spins it
         self.spins = given is None or not given.get_nodes()
         self._context = context  # to be shut down here
         if context is None and (brought := node or given):
@@ -123,7 +123,7 @@ class Spinner:
         Return another one where the shared one is broken, and in a callback of its own: its maker
         may be waiting for the callback to end.
         """
-        keep_log()  # it may set a variable
+        keep_log()  # keep_log may set a variable
         settings = os.getpid(), *sys.argv, *sorted(os.environ.items())
         with _users_lock:
             found = _shared.get(settings)
@@ -224,7 +224,7 @@ class Spinner:
     def _ask_for_life(self) -> None:
         self._alive = threading.Event()
         self._asked_at = time.monotonic()
-        with contextlib.suppress(AttributeError):  # of the guard of an executor that is shut down
+        with contextlib.suppress(AttributeError):  # the guard of an executor that is shut down
             self.executor.create_task(self._alive.set)
             self.executor.wake()
 
@@ -233,7 +233,7 @@ class Spinner:
         return executor is not self.executor and executor is not None
 
     def _left(self) -> bool:
-        """Return whether the node was taken out of its executor; after a shutdown, none is in it."""
+        """Return whether the node was taken out of its executor; a shutdown takes it out, too."""
         return self.node not in self.executor.get_nodes()
 
     def _gone(self) -> RuntimeError:
@@ -286,7 +286,7 @@ class Spinner:
         if thread is None:
             return False
         self._stopping = True
-        with contextlib.suppress(Exception):  # of a guard whose context is gone
+        with contextlib.suppress(Exception):  # a guard without its context
             self.executor.create_task(int)  # does nothing: spin_once returns after it
         thread.join()
         return True
@@ -295,7 +295,7 @@ class Spinner:
         self._halt()
         if self.spins and self._own_executor:
             if isinstance(self.executor, OnceExecutor):
-                self.executor.pool.shutdown()  # what it still runs needs the executor's guard
+                self.executor.pool.shutdown()  # running work needs the executor's guard
             self.executor.shutdown()
         if self._added and self.node.executor is self.executor:
             self.node.executor = None  # takes it out of the executor, and lets another have it

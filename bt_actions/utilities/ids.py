@@ -92,7 +92,7 @@ def _start_of(pid: int) -> bytes | None:
     """Return a token of the moment a process started; None for a process that is gone."""
     try:
         stat = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
-    except OSError:  # there is none, or /proc does not show it, or no file can be opened
+    except OSError:  # no process, a hidden one, or no more files
         return _without_proc(pid)
     fields = stat.rpartition(")")[2].split()
     if fields[0] in "ZX":
@@ -106,5 +106,5 @@ def _without_proc(pid: int) -> bytes | None:
     except (ProcessLookupError, OverflowError):
         return None
     except OSError:
-        pass  # it is somebody else's
+        pass  # somebody else's process
     return _HIDDEN

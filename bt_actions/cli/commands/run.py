@@ -139,7 +139,7 @@ def run(args: argparse.Namespace) -> int:
     )
 
     show(args)
-    cleans_up = args.cleanup_first and not is_simulated  # which is private
+    cleans_up = args.cleanup_first and not is_simulated  # a simulation is private
     servers = _servers(args, root) if cleans_up else []
     outlook = _outlook()  # early: it is to have seen other nodes when ours gets its name
     try:

@@ -112,7 +112,7 @@ class Drive:
                 thread.join()
                 break
             if self._stopped_at is not None or self._state.finished is not None:
-                deadline = None  # there is nothing left to end
+                deadline = None  # no goal is left to end
             if deadline is not None and now >= deadline:
                 self._end(Exit.TIMEOUT, f"--timeout {self._timeout:g} s expired")
             if now - drawn >= FRAME:
@@ -126,7 +126,7 @@ class Drive:
             )
             if not (received or self._finished.is_set()):
                 time.sleep(GATHER)
-            self._take_events()  # what happened before the signal
+            self._take_events()  # events from before the signal
             for signal in received:
                 self._signalled(signal)
             if self._watched in ready:

@@ -157,7 +157,7 @@ class Session:
     ) -> Exit:
         """Run to the end, show it all, return the exit code; an abandoned run never returns."""
         try:
-            if view.fileno < 0:  # else the view reads standard error itself
+            if view.fileno < 0:  # other views read standard error themselves
                 self._output.catch_stderr()
             if self._recorder is not None:
                 self._recorder.record(self._runner.stream, self._runner.ticks_since)

@@ -48,7 +48,7 @@ class Signals:
         self._read, self._write = os.pipe()
         for end in (self._read, self._write):
             os.set_blocking(end, False)
-        self._before: dict[signal.Signals, Any] = {}  # what signal.getsignal returns
+        self._before: dict[signal.Signals, Any] = {}  # the type of signal.getsignal
         self._wakeup_before = -1
         self._first_at = math.inf
         self._closing = threading.Lock()

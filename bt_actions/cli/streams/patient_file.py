@@ -155,7 +155,7 @@ class PatientFile(io.RawIOBase):
         while left:
             try:
                 left = left[os.write(self._descriptor, left) :]
-            except BlockingIOError:  # whoever shares it has made it so
+            except BlockingIOError:  # another owner made the file so
                 poll = select.poll()
                 poll.register(self._descriptor, select.POLLOUT)
                 poll.poll()

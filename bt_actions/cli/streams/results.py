@@ -54,7 +54,7 @@ def keep_results_apart() -> None:
     stdout = kept = sys.stdout
     stdout.flush()
     if _is_descriptor(stdout):
-        descriptor = os.dup(STDOUT)  # which no child process inherits
+        descriptor = os.dup(STDOUT)  # no child process inherits it
         kept = os.fdopen(
             descriptor, "w", encoding=stdout.encoding, errors=stdout.errors, closefd=False
         )

@@ -116,10 +116,10 @@ class LineView(View):
         key, action = event.node, self._state.action(event.node)
         self._passing.pop(key, None)
         if event.outcome is Outcome.SUCCEEDED:
-            return  # which is told by the leaf's
+            return  # the leaf's line tells it
         is_over = event.outcome is not None
         if is_over and (event.state == DONE or event.end is not End.UNKNOWN):
-            if action.goals[event.goal_id].verdict is not None:  # else that is to come
+            if action.goals[event.goal_id].verdict is not None:  # else a verdict follows
                 end = "end not known" if event.end is End.UNKNOWN else f"ended {event.end}"
                 self._line(event.at.steady, "goal", key, f"{_which(action, event)}{end}")
         elif not is_over and (self._verbose or event.state == "EXECUTING"):

@@ -106,7 +106,7 @@ class LiveView(View):
         story, status = self._state.nodes[event.node], event.status
         (self._running.add if status is Status.RUNNING else self._running.discard)(event.node)
         if not story.is_leaf:
-            if status is not Status.INVALID:  # it may have begun anew
+            if status is not Status.INVALID:  # the node may have begun anew
                 below = self._done.intersection(self._state.below(event.node))
                 self._done -= {each for each in below if not self._state.is_begun(each)}
             return

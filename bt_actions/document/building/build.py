@@ -77,7 +77,7 @@ def _connect(root: Behaviour, topics: list[TopicValue]) -> None:
     set_up, shut_down = root.setup, root.shutdown
 
     def setup(**kwargs: Any) -> None:
-        set_up(**kwargs)  # which shuts a leaf down that was set up before
+        set_up(**kwargs)  # shuts leaves down that were set up
         for topic in topics:
             topic.setup(**kwargs)
 
@@ -102,7 +102,7 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
         gate(behaviour, {key: context.said(each) for key, each in gates.items()}, **conditions)
     if context.topics:
         written = settings_of(node, context.document) if node.is_action else node.values
-        if node.kind.only_asks and node.kind.slow:  # which waits anyway
+        if node.kind.only_asks and node.kind.slow:  # a slow check waits anyway
             written = gates
         names = {name for each in computed_in(written) for name in each.expression.variables}
         if read := [topic for name, topic in context.topics.items() if name in names]:

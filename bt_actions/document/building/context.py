@@ -97,7 +97,7 @@ class Scope:
         name = _safe(tree)
         number = self._children[name] = self._children.get(name, 0) + 1
         scope = Scope(f"{self.prefix}/{name}_{number}")
-        scope._outer = self  # which lives as long, and so do the variables
+        scope._outer = self  # the outer scope lives as long, with its variables
         return scope
 
     def key(self, name: str) -> str:
@@ -286,7 +286,7 @@ def _numbers(
     for part in path:
         inner = fields.describe(kind.cls) if isinstance(kind, fields.Message) else {}
         kind = inner.get(part)
-    if kind == fields.Scalar("float32"):  # which is read by the fewest digits that give it
+    if kind == fields.Scalar("float32"):  # a float32 is read by its fewest digits
         return None
     item = kind.item if isinstance(kind, fields.Listing) and kind.size is None else kind
     if not isinstance(item, fields.Scalar) or item.name not in _NUMBERS:

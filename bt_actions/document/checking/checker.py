@@ -345,7 +345,7 @@ class Checker:
             may_need_more = wanted == TEXT or wanted is ANGLE or isinstance(wanted, Message)
             if may_need_more and isinstance(item, (int, float)):
                 at = locate(node, path)
-                if isinstance(at, Scalar) and at.value == item:  # else it comes from a file
+                if isinstance(at, Scalar) and at.value == item:  # else the item comes from a file
                     return self._needs_unit_or_quotes(at, item, wanted)
             return item is BAD
 

@@ -406,7 +406,7 @@ def _number_of(node: ast.expr) -> int | float | None:
                 if left is not None and right is not None:
                     return number(bounded(BINARY[type(op)](left, right)))
     except (ValueError, ArithmeticError):
-        pass  # told of that part itself
+        pass  # reported at the part itself
     return None
 
 

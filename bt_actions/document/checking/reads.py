@@ -207,7 +207,7 @@ class _Missing:
 
     def _look_at(self, fallback: TreeNode) -> None:
         lacked: dict[str, tuple[_Need, bool]] = {}  # and whether its branch does nothing but ask
-        settled: set[str] = set()  # it was told of, or an earlier child asks whether it is known
+        settled: set[str] = set()  # reported, or asked for by `known` before
         for child in fallback.children:
             needs = [need for need in self._needs(child)[0] if self._may_lack(need.name)]
             asks, waits = _only_asks(child), _ended_waits(child)

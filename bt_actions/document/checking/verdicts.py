@@ -58,7 +58,7 @@ class Verdicts:
             limit = values.get(kind.name)
             return limit if isinstance(limit, float) else 0.0
         limit, form = values.get("timeout"), kind.keys["timeout"].shape
-        if isinstance(form, Record):  # of which a bare duration is the longest
+        if isinstance(form, Record):  # a bare duration is the longest deadline
             limit = limit.get(form.short) if isinstance(limit, dict) else None
         return of_tries(limit if isinstance(limit, float) else 0.0, values.get("retry"))
 
@@ -71,7 +71,7 @@ def _below(node: TreeNode) -> list[TreeNode]:
 
 def of_rounds(each: float, count: int) -> float:
     """Return the seconds of so many rounds."""
-    return each * float(min(count, 10**12))  # which no arithmetic overflows with
+    return each * float(min(count, 10**12))  # no arithmetic overflows with this
 
 
 def of_tries(each: float, retry: object) -> float:

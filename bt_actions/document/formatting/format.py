@@ -61,7 +61,7 @@ def format_source(source: Source) -> str:
 def _written(source: Source) -> tuple[Node | None, dict[int, str]]:
     again = Source(source.name, source.text)
     root, anchors = compose_written(again)
-    if again.findings:  # of these forms alone: the text itself is sound
+    if again.findings:  # a form is at fault: the text is sound
         raise FormatError(f"line {again.findings[0].line}: an alias stands for a key")
     for name, times in Counter(anchors.values()).items():
         if times > 1:
@@ -220,7 +220,7 @@ class _Layout:
         if isinstance(node, Scalar):
             return self._raw(node)
         if isinstance(node, Alias):
-            return f"*{node.name} "  # else a ':' or ',' behind it could be taken for its name's
+            return f"*{node.name} "  # a ':' or ',' behind the name would belong to it
         anchor = self._anchor(node).lstrip()
         anchor = f"{anchor} " if anchor else ""
         if isinstance(node, Listing):
@@ -456,7 +456,7 @@ def _blocks(root: Node, anchored: Container[int]) -> Iterator[tuple[Mapping | Li
                 yield node, node.pairs[0][0].column
             stack.extend(value for _, value in node.pairs)
         elif isinstance(node, Listing) and not node.flow and node.items:
-            if id(node) not in anchored:  # else its column is its anchor's
+            if id(node) not in anchored:  # an anchor has a column of its own
                 yield node, node.column
             stack.extend(node.items)
 

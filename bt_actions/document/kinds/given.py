@@ -38,7 +38,7 @@ else:
 
         def __getattr__(self, name: str) -> object:
             value = getattr(import_module(self._module), name)
-            setattr(self, name, value)  # which is not asked for again
+            setattr(self, name, value)  # the next read finds the attribute
             return value
 
     py_trees = _Later("py_trees")

@@ -112,7 +112,7 @@ def _check(checker: Checker, node: TreeNode) -> None:
 def _type(checker: Checker, declared: Mapping[str, object]) -> FieldType | None:
     try:
         return parse_type(str(declared.get("type")), types=checker.types)
-    except TypeNameError:  # told where the kind is declared
+    except TypeNameError:  # reported at the declaration
         return None
 
 

@@ -49,7 +49,7 @@ def find_tree(name_or_path: str | os.PathLike[str], *, beside: Path | None = Non
         if is_file(candidate):
             return candidate
     if _is_there(exact):
-        return exact  # whoever reads it will say what it is
+        return exact  # the reader will report the folder
     _refuse_links(exact, *candidates)
     raise TreeNotFoundError(_nowhere(wanted, exact, is_name), _searched(exact) if is_name else None)
 

@@ -123,7 +123,7 @@ def parse_text(text: str) -> object:
     if source.findings:
         raise ValueError(f"{text!r}: {source.findings[0].message}")
     value: object = None
-    with contextlib.suppress(TooManyErrors):  # which are filed
+    with contextlib.suppress(TooManyErrors):  # the source has them
         value = None if node is None else read_value(node, source)
     for finding in source.findings:
         raise ValueError(f"{finding.message} ({finding.hint})" if finding.hint else finding.message)

@@ -91,7 +91,7 @@ class Workspace:
         found = [one for findings in failed for one in findings if one.code == "BT101"]
         for source in self._sources:
             found += sorted(source.findings, key=lambda one: (one.line, one.column, one.code))
-        return list(dict.fromkeys(found))  # what an alias repeats is wrong once
+        return list(dict.fromkeys(found))  # an alias repeats a finding
 
     @contextlib.contextmanager
     def as_it_was(self) -> Iterator[None]:
@@ -214,7 +214,7 @@ class Workspace:
             except DocumentError as error:
                 self._failed[key] = error
         first = self._failed[key].findings[0]
-        if first.code != "BT101":  # which is told where it stands in that file
+        if first.code != "BT101":  # BT101 stands in the other file
             source.report("BT209", span_of(written), f"{path.name or path}: {first.message}")
         return None
 

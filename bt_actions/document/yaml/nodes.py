@@ -28,7 +28,7 @@ class Node:
     """A range of the text; lines and columns count from 1, the end is one past the last."""
 
     __slots__ = ("begin", "end")
-    begin: Mark  # which counts from 0
+    begin: Mark  # marks count from 0
     end: Mark
 
     @property

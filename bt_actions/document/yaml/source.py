@@ -212,7 +212,7 @@ def read_source(path: Path, name: str | None = None, *, pipes: bool = True) -> S
         with path.open("rb", buffering=0) as stream:
             data = stream.read(size + 1)  # to ask for more takes that much memory at once
             while len(data) <= MAX_BYTES and (more := stream.read(_CHUNK)):
-                data += more  # it has grown, or nobody knows how large it is
+                data += more  # a growing file, or one of unknown size
     except DocumentError:  # is a ValueError, too
         raise
     except (OSError, ValueError) as error:

@@ -154,7 +154,7 @@ def _behind(problem: str, text: str, span: Span) -> _Said | None:
         span = Span(span.line, column, span.line, column + len(braced[0].rstrip()))
         hint = f"leave the braces away, or write ${braced[1]} for a variable"
         return _Said(span, f"{{{braced[1]}}} is read as a mapping", hint, "BT117")
-    inside = "expected ','" in problem  # of { } or [ ], where a comma may be what is missing
+    inside = "expected ','" in problem  # { } or [ ], where a comma may be missing
     last = before[-1:] if inside else before.rstrip()[-1:]
     if last in _QUOTES:
         return _Said(span, f"the {last} before this ends the text", _QUOTES[last])

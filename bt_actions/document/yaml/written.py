@@ -168,7 +168,7 @@ def inner_span(node: Scalar, source: Source, start: int, end: int) -> Span:
     chars = _decoded(node, source)
     if not chars:
         return span_of(node)
-    if start >= len(chars):  # what is missing would stand behind it
+    if start >= len(chars):  # a missing part would stand behind the text
         _, line, column = chars[-1]
         return Span(line, column + 1, line, column + 2)
     last = min(max(end, start + 1), len(chars)) - 1

@@ -1,4 +1,4 @@
-"""Questions to servers in sight, asked by a participant that is gone afterwards. All calls block."""
+"""Questions to servers in sight, from a participant that is gone afterwards. All calls block."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Asker:
         return next((each for each in answers if each is not None), None)
 
     def answers(self, service_type: Any, namespace: str) -> dict[str, Any]:
-        """Ask every service of a type below a namespace; return answers by name, None for silence."""
+        """Ask all services of a type below a namespace; return answers by name, None for none."""
         below = f"/{namespace.strip('/')}/".replace("//", "/")
         asked: dict[str, _Question] = {}
         for passed in self._looks(PATIENCE + DISCOVERS):

@@ -28,7 +28,7 @@ class OnceExecutor(MultiThreadedExecutor):  # type: ignore[misc]
 
     def __init__(self, num_threads: int, *, context: Any = None) -> None:
         super().__init__(num_threads, context=context)
-        self._executor.shutdown()  # it has no thread yet
+        self._executor.shutdown()  # the pool has no thread yet
         self._executor = self.pool = _Pool(num_threads)
 
     def wait_for_ready_callbacks(self, *args: Any, **options: Any) -> Any:

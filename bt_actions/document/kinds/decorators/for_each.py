@@ -32,7 +32,7 @@ def _check(checker: Checker, node: TreeNode) -> None:
     if item == index and "index" in node.written:
         text = f"the item and its index are both called {item!r}"
         checker.source.report("BT216", span_of(node.written["index"]), text)
-    if isinstance(index, str) and index not in checker.document.topics:  # which BT312 tells of
+    if isinstance(index, str) and index not in checker.document.topics:  # a topic is BT312's
         checker.assigns(index, INTEGER, node.written["index"])
     items = node.values.get("in")
     wanted = checker.variables.get(str(item)) if item in checker.declared_at else None

@@ -24,6 +24,6 @@ KIND = leaf(
     "log: The level is $(level)\nlevel: warn",
     Key("level", Choice(("debug", "info", "warn", "error", "fatal")), "The severity.",
         default="info"),
-    reads="",  # it never fails
+    reads="",  # a log never fails
     build=_build, check=_check, ends=lambda _values, _inner, _at_once: SUCCEEDS,
 )  # fmt: skip

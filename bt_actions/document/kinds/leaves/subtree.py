@@ -46,7 +46,7 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
     written |= _writes(included, included.nodes())
     for inner in included.nodes():
         if inner.kind.once:
-            written -= _writes(included, inner.walk())  # which is not done again
+            written -= _writes(included, inner.walk())  # a run_once writes no second time
 
     def inputs() -> dict[str, object]:
         values = given()
@@ -67,7 +67,7 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
         scope.write_all(values)
 
     def pass_on() -> None:
-        with contextlib.suppress(ValueError):  # what was passed before stays
+        with contextlib.suppress(ValueError):  # the former input stays
             now = inputs()
             changed = {name: now[name] for name in now if not same(passed.get(name), now[name])}
             passed.update(changed)
@@ -93,7 +93,7 @@ def _static(node: TreeNode, included: Document, outer: Mapped[str, object]) -> d
         found.pop(name, None)
         read = {each for one in computed_in(value) for each in one.expression.variables}
         if read <= outer.keys():
-            with contextlib.suppress(ValueError):  # told where it is begun
+            with contextlib.suppress(ValueError):  # reported at the begin
                 found[name] = resolve(value, outer.__getitem__)
     return found
 
