@@ -39,8 +39,8 @@ _RULES = (
         tree("root:\n  success: Done\n"),
     ),
     Rule("BT104", "a key is here twice",
-        "A key stands twice in one mapping. YAML tools keep one of the two, and not all the same "
-        "one.",
+        "A key stands twice in one mapping. YAML tools keep one of the two, and not all tools the "
+        "same one.",
         tree("root:\n  success: Done\n  success: Again\n"),
         tree("root:\n  success: Done\n"),
     ),
@@ -59,7 +59,7 @@ _RULES = (
     ),
     Rule("BT107", "unknown key",
         "No such key can stand here. Nothing is ignored silently: a misspelt key would otherwise "
-        "do nothing, and nobody would know.",
+        "do nothing, unnoticed.",
         tree("root:\n  sequence: Work\n  memroy: false\n  children: [{success: Done}]\n"),
         tree("root:\n  sequence: Work\n  memory: false\n  children: [{success: Done}]\n"),
     ),
@@ -82,14 +82,13 @@ _RULES = (
         tree("root: {wait: 5 s}\n"),
     ),
     Rule("BT111", "a node without a kind",
-        "One key of a node says what it is: a kind, or an action that the tree declares. This node"
-        " has none.",
+        "One key of a node is its kind, or an action that the tree declares. This node has none.",
         tree("root: {name: Done}\n"),
         tree(SUCCESS),
     ),
     Rule("BT112", "a node with two kinds",
-        "One key of a node says what it is; here are two. Most often the dash that begins the next"
-        " node is missing.",
+        "One key of a node is its kind; here are two. Most often the dash that begins the next "
+        "node is missing.",
         tree("root:\n  sequence: Work\n  fallback: Else\n  children: [{success: Done}]\n"),
         tree(
             "root:\n  sequence: Work\n  children:\n    - fallback: Else\n"
@@ -116,9 +115,9 @@ _RULES = (
         tree("inputs: {level: float64}\nroot: {log: The level is $(level) now}\n"),
     ),
     Rule("BT116", "a text was cut by '#'",
-        "A '#' behind a space begins a comment, wherever it stands. Put the text in quotes where "
-        "it belongs to it. Where a space follows the '#', a comment was meant, and nothing is "
-        "said; nor is it behind numbers, times and single words of the language.",
+        "A '#' behind a space begins a comment, wherever it stands. Put a text with a '#' in "
+        "quotes. A '#' with a space behind is a comment that is meant, and gets no warning; nor "
+        "does one behind numbers, times and single words of the language.",
         tree("root: \n  success: Part #3\n"),
         tree('root: \n  success: "Part #3"\n'),
         Severity.WARNING,
@@ -142,8 +141,8 @@ _RULES = (
              "  child: {success: Done}\n"),
     ),
     Rule("BT120", "an ignore that silences nothing",
-        "This ignore silences nothing. It may have been of use once; now it would hide what comes "
-        "later.",
+        "This ignore silences nothing. It may have been of use once; now it would hide a later "
+        "finding.",
         tree("root: {success: Done}  # bt: ignore[BT304] no longer a retry\n"),
         tree(SUCCESS),
     ),
@@ -166,8 +165,8 @@ _RULES = (
         tree("inputs: {level: float64}\nroot: {check: $level > 0.2}\n"),
     ),
     Rule("BT203", "a message has no such field",
-        "The ROS message that this is about has no field of this name. `bt-actions interfaces show "
-        "TYPE` prints what it has.",
+        "The ROS message in question has no field of this name. `bt-actions interfaces show TYPE` "
+        "prints its fields.",
         moving("root:\n  move: Go\n  goal: {distnace: 2.0}\n"),
         moving("root:\n  move: Go\n  goal: {distance: 2.0}\n"),
     ),
@@ -178,10 +177,10 @@ _RULES = (
         moving("root:\n  move: Go\n  goal: {distance: 2.0}\n"),
     ),
     Rule("BT205", "a type is not installed",
-        "The package of this action, service or message is not installed here, or has none of this"
-        " name. `bt-actions interfaces list` prints what there is. Source the workspace that it is "
-        "built in; without a workspace, `bt-actions interfaces build PATH` builds and installs the "
-        "package from its sources. Or check with --no-types.",
+        "The package of this action, service or message is not installed here, or has no type of "
+        "this name. `bt-actions interfaces list` prints the installed types. Source the workspace "
+        "that the package is built in; without a workspace, `bt-actions interfaces build PATH` "
+        "builds and installs the package from its sources. Or check with --no-types.",
         "tree: example\n" + MOVE.replace("MoveRobot", "MoveRobt")
         + "root: {move: Go, goal: {distance: 1.0}}\n",
         moving("root: {move: Go, goal: {distance: 1.0}}\n"),
@@ -199,52 +198,52 @@ _RULES = (
         tree("inputs: {level: float64}\nroot: {check: $level > 1}\n"),
     ),
     Rule("BT208", "an action's name hides a kind or a key of nodes",
-        "An action's name may not be that of a kind, or of a key that nodes have: nobody could "
-        "tell them apart.",
+        "An action's name may not be that of a kind, or of a key that nodes have: the two could "
+        "not be told apart.",
         "tree: example\n" + MOVE.replace("  move:", "  wait:") + "root: {wait: 5 s}\n",
         moving("root:\n  sequence: Work\n  children: [{move: Go}, {wait: 5 s}]\n"),
     ),
     Rule("BT209", "a tree that is included cannot be read",
-        "A tree that is included, or a file that is imported, cannot be read. It is looked for "
-        "beside this file, then by its name in BT_ACTIONS_TREE_PATH and in the installed packages.",
+        "An included tree, or an imported file, cannot be read. The search goes beside this file, "
+        "then by its name in BT_ACTIONS_TREE_PATH and in the installed packages.",
         tree("root: {subtree: no_such_tree.yaml}\n"),
         tree("root: {subtree: recover}\n"),
     ),
     Rule("BT210", "a tree that includes itself",
-        "A tree includes itself, directly or by way of others: it would never end. Use 'repeat' or"
-        " 'retry'.",
+        "A tree includes itself, directly or by way of others: the tree would never end. Use "
+        "'repeat' or 'retry'.",
         tree("root: {subtree: wrong.yaml}\n"),
         tree("root:\n  repeat: Again\n  times: 2\n  child: {success: Done}\n"),
     ),
     Rule("BT211", "an input is missing",
-        "The tree that is included has an input without a default, and 'with' does not give it. "
+        "The included tree has an input without a default, and 'with' has no value for the input. "
         "(The wrong example includes a tree with such an input, needs_input.yaml.)",
         tree("root: {subtree: needs_input.yaml}\n"),
         tree("root: {subtree: needs_input.yaml, with: {speed: 1.0}}\n"),
     ),
     Rule("BT212", "unknown input",
-        "The tree that is included has no input of this name.",
+        "The included tree has no input of this name.",
         tree("root: {subtree: recover, with: {hoem: 0.0}}\n"),
         tree("root: {subtree: recover, with: {home: 0.0}}\n"),
     ),
     Rule("BT213", "unknown output",
-        "The tree that is included has no output of this name.",
+        "The included tree has no output of this name.",
         tree("outputs: {at: float64}\nroot: {subtree: pick_and_place, save: {at: final_pos}}\n"),
         tree("outputs: {at: float64}\nroot: {subtree: pick_and_place, save: {at: final_pose}}\n"),
     ),
     Rule("BT214", "a class cannot be used as a behaviour",
-        "'python' names a class that can be imported here, and that is a py_trees behaviour.",
+        "'python' must name a py_trees behaviour that can be imported here.",
         tree("root: {python: py_trees.behaviours.Succes}\n"),
         tree("root: {python: py_trees.behaviours.Success}\n"),
     ),
     Rule("BT215", "arguments do not fit",
-        "The arguments do not fit the constructor of the class. Its name is given by the node. "
-        "Where a parameter is annotated with an enum, the argument is the name of a member.",
+        "The arguments do not fit the constructor of the class. The node gives the behaviour's "
+        "name. Where a parameter is annotated with an enum, the argument is the name of a member.",
         tree("root: {python: py_trees.behaviours.Periodic, arguments: {number: 3}}\n"),
         tree("root: {python: py_trees.behaviours.Periodic, arguments: {n: 3}}\n"),
     ),
     Rule("BT216", "a name is declared twice",
-        "Two things have one name, so that it is not clear which is meant.",
+        "Two things have one name, so that the name has no clear meaning.",
         tree("inputs: {door: bool}\ntopics: {door: {topic: door, type: std_msgs/msg/Bool}}\n"
              "root: {check: $door}\n"),
         tree("topics: {door: {topic: door, type: std_msgs/msg/Bool}}\n"
@@ -252,9 +251,9 @@ _RULES = (
     ),
     Rule("BT217", "one name with two types",
         "A name of ROS has one type. A tree, with all that it includes, uses this action server, "
-        "service or topic with two: the second could not even be connected to. A relative name is "
-        "read as in the namespace /: where the tree runs in another, 'robot' and '/robot' differ, "
-        "and the tree's own 'namespace' says so.",
+        "service or topic with two: the second could not even be connected. A relative name is "
+        "read as in the namespace /: for a tree in another namespace, 'robot' and '/robot' "
+        "differ, and the tree's own 'namespace' says so.",
         tree("root:\n  sequence: S\n  children:\n"
              "    - {publish: said, type: std_msgs/msg/String}\n"
              "    - {publish: said, type: std_msgs/msg/Bool}\n"),
