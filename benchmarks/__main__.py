@@ -85,9 +85,10 @@ journal showed that each ran once and in its order.
   That is in its growth, too; so is that large trees outgrow the processor's cache, in both.
 - In row 15 an action is told in nine events. The chain keeps Python's interpreter busy nearly all
   the time, and an interpreter does one thing at a time: what the recorder's thread does for these
-  events, some 20 µs each, is time that the next action waits for. A recorder in a process of its own would
-  miss the limit, too: to note an event, to make the event of the note, and to pickle it takes 9 µs,
-  which is 4 % of such an action. A second of work in each action makes of all that 0.02 %.
+  events, some 20 µs each, is time that the next action waits for. A recorder in a process of its
+  own would miss the limit, too: to note an event, to make the event of the note, and to pickle it
+  takes 9 µs, which is 4 % of such an action. A second of work in each action makes of all that
+  0.02 %.
 - Rows 17 to 19 are of the page of `bt-actions view` in headless Chromium: what its scripts take for
   a frame that paints; from an event in the run, through its recorder and the page's server, to the
   task behind the frame that shows the event; and from a press to the task behind the frame.
