@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 
 from bt_actions.document import DocumentError, Finding, Tree, open_tree
-from bt_actions.document.reading.find import is_tree_file
+from bt_actions.document.reading.find import is_tree_file, own_folders
 from bt_actions.serving.requests import GoalRefused, Mistake, inputs_of
 from bt_actions.utilities.patience import Patience
 from bt_actions.utilities.plain_text import clean
@@ -192,7 +192,7 @@ class Catalog:
             return before
         begun = time.time_ns()
         try:
-            tree = open_tree(file, python=self._python, within=there)
+            tree = open_tree(file, python=self._python, within=(*there, *own_folders()))
         except DocumentError as error:
             if before is None and _holds_no_tree(error.findings):
                 return None

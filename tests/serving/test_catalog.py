@@ -165,6 +165,11 @@ def test_nothing_outside_of_the_folders_is_read(
     assert (code, "outside of the folders" in message) == ("BT209", True)
 
 
+def test_what_comes_with_bt_actions_may_be_named(catalog: Catalog, write: Write) -> None:
+    write("go.yaml", "tree: go\nroot: {subtree: pick_and_place}\n")
+    catalog.check("go", "")
+
+
 @pytest.mark.parametrize(
     "root",
     [

@@ -14,6 +14,8 @@ _SUFFIXES = (".yaml", ".yml")
 _MOST = 4
 """Folders that a message names."""
 _SEARCH_PATH = "BT_ACTIONS_TREE_PATH"
+_CHECKOUT = Path(__file__).resolve().parents[3] / "trees"
+_INSTALLED = Path("share", "bt_actions", "trees")
 
 
 class TreeNotFoundError(FileNotFoundError):
@@ -59,13 +61,17 @@ def tree_folders() -> Iterator[Path]:
     for entry in os.environ.get(_SEARCH_PATH, "").split(os.pathsep):
         if entry:
             yield Path(entry)
-    yield Path(__file__).resolve().parents[3] / "trees"  # an editable install's copies may be old
+    yield _CHECKOUT  # an editable install's copies may be old
     for prefix in _prefixes():
-        share = prefix / "share"
-        yield share / "bt_actions" / "trees"
+        yield prefix / _INSTALLED
         for package in _packages(prefix):
             if package != "bt_actions":
-                yield share / package / "trees"
+                yield prefix / "share" / package / "trees"
+
+
+def own_folders() -> list[Path]:
+    """Return the folders of what comes with bt_actions: trees, and words to import."""
+    return [_CHECKOUT, *(prefix / _INSTALLED for prefix in _prefixes())]
 
 
 def tree_folder(place: str | os.PathLike[str]) -> Path:
