@@ -41,11 +41,11 @@ class _Filled:
             node = Node({kind: given.name()})
         else:
             node = given.named(
-                Node({kind: self._saves(value) if kind in SAVES else self._fill(value)})
+                Node({kind: self._saves(value, kind) if kind in SAVES else self._fill(value)})
             )
         self._declare(kind, node)
         for key, each in rest.items():
-            filled = self._saves(each) if key in SAVES else self._fill(each)
+            filled = self._saves(each, key) if key in SAVES else self._fill(each)
             if key in ("server", "topic"):
                 node[key] = ros_name("" if filled is _MISSING else filled)
             elif filled is not _MISSING and filled != {}:
@@ -85,9 +85,14 @@ class _Filled:
             return self._given.scope.literals[variable]
         return f"${self._given.scope[variable]}"
 
-    def _saves(self, saves: Mapping[str, str]) -> dict[str, str]:
-        found = {}
+    def _saves(self, saves: Mapping[str, str], key: str) -> dict[str, str]:
+        found, is_read = {}, self._given.writer.project.is_read
         for port, expression in saves.items():
+            name = variable_in(self._texts.get(port, ""), port)
+            if key != "set" and name and not is_read(self._given.scope.definition, name):
+                self._given.dropped(port, f"nothing reads {{{name}}}")
+                self._texts.pop(port)
+                continue
             value = self._port(port)
             if isinstance(value, str) and value.startswith("$"):
                 found[value[1:]] = self._fill(expression)

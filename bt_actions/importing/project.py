@@ -275,6 +275,10 @@ class Project:
             }
         return tree.outputs
 
+    def is_read(self, tree: Definition, name: str) -> bool:
+        """Return whether a tree reads a variable, or a caller gets what is in it."""
+        return "r" in tree.accesses.get(name, "") or name in self.outputs(tree)
+
     def reaches(self, definition: Definition, other: Definition) -> bool:
         """Return whether a tree is another one, or holds it."""
         waiting, seen = [definition], set()

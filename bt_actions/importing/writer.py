@@ -92,7 +92,9 @@ class Writer:
             if not self.definition.reads_first(each) or each in scope.topics:
                 continue
             name = input_name(each, taken=scope[each] in outputs)
-            inputs[name] = self.project.type_of(each)
+            kind = self.project.type_of(each)
+            begins_empty = "/" in kind and self.definition.writes(each)  # as a port of Nav2's does
+            inputs[name] = {"type": kind, "default": {}} if begins_empty else kind
             if scope[each] in outputs:
                 both[scope[each]] = f"${name}"
             if not self.project.knows(each):
