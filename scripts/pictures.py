@@ -12,7 +12,9 @@ from __future__ import annotations
 import hashlib
 import re
 import sys
+import tempfile
 import xml.etree.ElementTree as ET
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from py_trees.behaviour import Behaviour
 
 from bt_actions import load_tree
 from bt_actions.document.describing import nodes_of
+from bt_actions.importing.convert import convert
 from bt_actions.render import dot
 from bt_actions.render.graphviz import draw
 
@@ -27,6 +30,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PICTURES = {
     ROOT / "docs/images/first_tree.svg": ROOT / "examples/first/first.yaml",
     ROOT / "docs/images/leaf_by_leaf.svg": ROOT / "docs/tutorials/leaf_by_leaf.md",
+    ROOT / "docs/images/nav2_navigate.svg": ROOT / "tests/nav2/trees/replanning_and_recovery.xml",
     ROOT / "docs/images/own_action.svg": ROOT / "examples/dock/dock.yaml",
     ROOT / "docs/images/pick_and_place.svg": ROOT / "trees/pick_and_place.yaml",
 }
@@ -40,8 +44,16 @@ _PLACED |= {"x", "y"}
 def source(picture: Path) -> str:
     """Return the dot source of a picture. No type is looked up: some are not installed here."""
     shown = PICTURES[picture]
-    root = load_tree(shown, types=False) if shown.suffix == ".yaml" else _there(shown)
-    return dot(nodes_of(root))
+    made = {".md": _there, ".xml": _imported, ".yaml": partial(load_tree, types=False)}
+    return dot(nodes_of(made[shown.suffix](shown)))
+
+
+def _imported(xml: Path) -> Behaviour:
+    """Return a tree of Nav2's, as `bt-actions import` writes it."""
+    with tempfile.TemporaryDirectory() as folder:
+        ((name, text),) = convert([xml]).files.items()
+        (tree := Path(folder) / name).write_text(text, encoding="utf-8")
+        return load_tree(tree, {"goal": {}}, types=False)
 
 
 def _there(page: Path) -> Behaviour:

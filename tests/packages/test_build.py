@@ -15,7 +15,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from zipfile import ZipFile
 
 import pytest
 
@@ -153,49 +152,6 @@ def test_a_package_of_ones_own_is_built_upon_another_and_used_by_a_tree(
     said = environment.cli("interfaces", "build", shelf, code=2)
     assert "shelf_msgs is 1.1.0, and 1.2.0 is installed" in said
     assert environment.versions()["shelf_msgs"] == "1.2.0"
-
-
-def test_a_package_as_large_as_nav2_s_is_built(
-    environment: Environment, write: Write, tmp_path: Path
-) -> None:
-    """With a CMakeLists.txt that needs macros of a package which is not there, as theirs does."""
-    files = {
-        f"action/Do{number}.action": (
-            "# One of thirty.\ngeometry_msgs/PoseStamped[] goals\nstring behavior_tree\n---\n"
-            f"uint16 NONE=0\nuint16 LOST={number}\nuint16 error_code\nstring error_msg\n"
-            "nav_msgs/Path path\n---\ngeometry_msgs/PoseStamped pose\n"
-            "builtin_interfaces/Duration time\nfloat32 distance_remaining\nint16 number\n"
-        )
-        for number in range(30)
-    }
-    files |= {
-        f"msg/Map{number}.msg": "std_msgs/Header header\nuint8[] data\n" for number in range(4)
-    }
-    files |= {f"srv/Get{number}.srv": f"---\nMap{number} map\n" for number in range(2)}
-    named = "\n".join(f'  "{file}"' for file in files)
-    source = write(
-        "drive_msgs",
-        files,
-        depends="rclcpp drive_common nav_msgs",
-        cmake="find_package(drive_common REQUIRED)\ndrive_package()\n"
-        f"rosidl_generate_interfaces(${{PROJECT_NAME}}\n{named}\n DEPENDENCIES nav_msgs)\n",
-    )
-    environment.variables["CMAKE_BUILD_TYPE"] = "None"  # without optimisation: a third faster
-    out = tmp_path / "wheels"
-    said = environment.cli("interfaces", "build", source, "-o", out)
-    (wheel,) = out.glob("*.whl")
-    assert str(wheel) in said
-    assert environment.versions() == {}
-    with ZipFile(wheel) as opened:
-        names = opened.namelist()
-    assert len([name for name in names if name.endswith(".action")]) == 30
-    for wanted in (
-        r"drive_msgs/action/__init__\.py",
-        r".*/include/drive_msgs/.*/do0\.hpp",
-        r".*/drive_msgsConfig\.cmake",
-        r".*/lib/libdrive_msgs__rosidl_generator_c\.so",
-    ):
-        assert any(re.fullmatch(wanted, name) for name in names), wanted
 
 
 def test_what_does_not_compile_is_told_and_installs_nothing(
