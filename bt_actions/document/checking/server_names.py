@@ -16,6 +16,7 @@ from bt_actions.document.language.shapes import Key
 from bt_actions.document.language.values import computed_in
 from bt_actions.document.reading.tree import Document, table_of, text_of
 from bt_actions.document.yaml.nodes import Node, span_of
+from bt_actions.utilities.suggest import closest
 
 
 def _names(
@@ -74,10 +75,10 @@ def check_server_names(checker: Checker) -> None:
 def _check_input(checker: Checker, name: str, node: Node) -> None:
     if name not in checker.document.inputs:
         if not checker.doubts.declares(name):
-            checker.source.report(
-                "BT202", span_of(node),
-                f"a server's name has to be known before the tree runs, and ${name} is no input",
-            )  # fmt: skip
+            meant = closest(name, checker.document.inputs)
+            near = f"; did you mean '${meant}'?" if meant else ""
+            text = f"a server's name has to be known before the tree runs, and ${name} is no input"
+            checker.source.report("BT202", span_of(node), f"{text}{near}")
         return
     kind = checker.variables.get(name)
     if kind is not None and kind != TEXT:

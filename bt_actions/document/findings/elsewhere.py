@@ -29,6 +29,7 @@ _KINDS = _table(
         "here it is 'parallel'": "parallelall parallelnode concurrent all join gather",
         "here it is 'while'": "eternalguard",
         "here it is 'if'": "ifthenelse whiledoelse",
+        "'then' and 'else' stand beside an 'if'": "then else",
         "here it is 'invert'": "inverter not negate",
         "here it is 'retry'": "retryuntilsuccessful retryuntilsuccesful failureisrunning",
         "here it is 'repeat'": "keeprunninguntilfailure successisrunning",
@@ -38,7 +39,7 @@ _KINDS = _table(
         "here it is 'force_failure'": "failer successisfailure",
         "here it is 'success'": "alwayssuccess succeed",
         "here it is 'failure'": "alwaysfailure fail",
-        "here it is 'run_once'": "oneshot once",
+        "here it is 'run_once'": "oneshot once singletrigger",
         "here it is 'wait'": "delay sleep timer pause",
         "here it is 'wait_until'": "waitfor waitforblackboardvariable "
         "waitforblackboardvariablevalue",
@@ -91,6 +92,8 @@ _INSTEAD: dict[str, tuple[str, str]] = {
     for words, beside, here in (
         ("loop withitems", "", "put the node into a 'for_each'"),
         ("skipif", "", "write 'only_if: not ...'"),
+        ("elif elseif", "then", "write 'else', and another 'if' there"),
+        ("failsafter atleast", "policy", "write it below 'policy'"),
         ("onsuccess post", "", "put a 'set' behind the node, in a 'sequence'"),
         ("dependson requires", "", "the children of a 'sequence' run one after the other"),
         ("environment env envfile", "",
