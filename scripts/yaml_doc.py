@@ -362,12 +362,12 @@ def yaml_page() -> str:
     )  # fmt: skip
     lines += record("`topics`", TOPICS, TOPIC)
     lines += [example("topics"), ""]
-    lines += record("`kinds`", OWN_KINDS, OWN_KIND)
+    lines += [*record("`kinds`", OWN_KINDS, OWN_KIND), example("own_kinds"), ""]
     lines += part("`import`", IMPORT, "words", "imports")
     lines += part("`defaults`", DEFAULTS, "defaults")
     lines += part("`namespace`", NAMESPACE, "namespaces")
     lines += ["### `busy`", "", BUSY + "\n".join(busy()), ""]
-    lines += ["### `on_change` of an action", "", *ON_CHANGE.split("\n")]
+    lines += ["### `on_change` of an action", "", *ON_CHANGE.split("\n"), example("guided"), ""]
     lines += [*QOS.split("\n")]
     lines += record("`timeout` of an action", "`30 s` is short for `{result: 30 s}`.", TIMEOUT)
     lines += record("`retry` of an action", retry_text(), RETRY)

@@ -16,7 +16,7 @@ from geometry_msgs.msg import Polygon, PoseStamped
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 from sensor_msgs.msg import BatteryState
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Float64
 from std_srvs.srv import SetBool
 from trajectory_msgs.msg import JointTrajectory
 
@@ -263,3 +263,32 @@ def test_namespaces_tell_two_robots_apart(around: Surroundings) -> None:
     assert around.run(example("namespaces")) is Status.SUCCESS
     assert around.pose("cell/left") == pytest.approx(1.0, abs=0.02)
     assert around.pose("cell/right") == pytest.approx(2.0, abs=0.02)
+
+
+def test_a_robot_goes_on_to_where_the_target_is_now(around: Surroundings) -> None:
+    root = example("guided")
+    runner = VirtualRunner(root, around.network)
+    runner.start()
+    runner.advance(1.0)
+    around.network.publish("target_distance", Float64(data=1.0))
+    assert runner.run() is Status.SUCCESS
+    assert around.pose() == pytest.approx(1.0, abs=0.02)
+    assert tree_outputs(root) == {"why": ""}
+
+
+def test_a_robot_goes_no_farther_than_it_may_and_tells_why_it_failed(around: Surroundings) -> None:
+    for target, status, why in ((1e9, Status.FAILURE, "REJECTED"), (6.0, Status.SUCCESS, "")):
+        root = example("guided")
+        runner = VirtualRunner(root, around.network)
+        runner.start()
+        runner.advance(1.0)
+        around.network.publish("target_distance", Float64(data=target))
+        assert runner.run() is status
+        assert tree_outputs(root) == {"why": why}
+    assert 4.0 < around.pose() < 5.0
+
+
+def test_a_class_of_py_trees_is_a_kind(around: Surroundings) -> None:
+    root = example("own_kinds")
+    assert around.run(root) is Status.SUCCESS
+    assert [type(child).__name__ for child in root.children] == ["FailureIsSuccess", "Success"]
