@@ -2,8 +2,8 @@
 
 The deeds of each node stay, with time and outcome. Goals, results, feedback,
 variables, items, inputs and outputs go, and of each text the part that may hold values: see `said`.
-Of nodes' messages only the outcomes of actions stay, by their names: a user's leaf may say
-anything.
+Of nodes' messages only the outcomes of actions stay, by their names, and that a node was left out:
+a user's leaf may say anything.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import Any
 
 from bt_actions.events.kinds import (
+    LEFT_OUT,
     AttemptEnded,
     Event,
     FeedbackCame,
@@ -59,7 +60,9 @@ def said(text: str) -> str:
 
 
 def outcome_of(message: str) -> str:
-    """Return the outcome of an action that begins a node's message, or ""."""
+    """Return the outcome of an action, or `left out`, that begins a node's message, or ""."""
+    if message.partition(": ")[0] == LEFT_OUT:
+        return LEFT_OUT
     head = re.split(r"[ :]", message, maxsplit=1)[0]
     return head if head in _OUTCOMES else ""
 

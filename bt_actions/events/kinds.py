@@ -126,6 +126,11 @@ class NodeChanged(Event):
         """Whether the node was left out: its parent goes on as if it were not there."""
         return says_left_out(self.status, self.message)
 
+    @property
+    def why_left_out(self) -> str:
+        """Why the node was left out: its condition, and what stood in it; "" for its children's."""
+        return self.message.removeprefix(LEFT_OUT).removeprefix(": ")
+
 
 @dataclass(frozen=True, slots=True)
 class TickLasts(Event):

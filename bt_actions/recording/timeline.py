@@ -33,6 +33,7 @@ from bt_actions.events import (
     VariableWritten,
 )
 from bt_actions.events.bare import bare
+from bt_actions.events.kinds import LEFT_OUT
 from bt_actions.goals.policy import Outcome
 from bt_actions.recording.reading import Item, Recording
 from bt_actions.story.actions import DONE, ActionStory, GoalStory
@@ -57,7 +58,7 @@ class Line:
     seconds: float
     """Seconds since the run began."""
     kind: str
-    """SUCCESS, FAILURE, STOPPED, goal, round, variable, log, server, ..."""
+    """SUCCESS, FAILURE, STOPPED, left out, goal, round, variable, log, server, ..."""
     text: str
     node: int | None = None
     path: tuple[str, ...] = ()
@@ -172,6 +173,8 @@ class Timeline:
         is_stopped = event.status is Status.INVALID and was is Status.RUNNING and story.is_leaf
         if event.status not in OVER and not is_stopped:
             return "", ""
+        if event.is_left_out:
+            return LEFT_OUT, brief(event.why_left_out)
         if story.node.kind == "log" and event.status is Status.SUCCESS:  # its message has a line
             return "", ""
         text = event.warning or event.message

@@ -141,6 +141,23 @@ def test_what_happened_has_a_line_for_each_thing_that_somebody_cares_for(
     assert not [line for line in lines if "RUNNING" in line]
 
 
+@pytest.mark.parametrize("values", [True, False], ids=["with values", "without"])
+def test_a_node_that_was_left_out_is_told_as_such(tmp_path: Path, values: bool) -> None:
+    tree = tmp_path / "tree.yaml"
+    tree.write_text(
+        "tree: t\ninputs: {near: {type: bool, default: false}}\nroot:\n  fallback: F\n  children:\n"
+        "    - {log: Here, only_if: $near}\n    - {success: There}\n",
+        encoding="utf-8",
+    )
+    runner = VirtualRunner(load_tree(tree), VirtualNetwork())
+    runner.run()
+    (report,) = reports(record(runner.events, tmp_path), values=values)
+    lines = [str(line)[12:] for line in report.lines()]
+    why = ": $near is false" if values else ""
+    assert [line for line in lines if f"left out  log Here{why}" in line], lines
+    assert not [line for line in lines if "FAILURE" in line]
+
+
 def test_each_line_has_seconds_since_the_beginning_and_the_time_of_the_day(
     story: Story, leaf: FakeNode, tmp_path: Path
 ) -> None:

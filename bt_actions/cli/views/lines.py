@@ -94,8 +94,7 @@ class LineView(View):
             return
         self._nodes[event.node] = event.status
         if event.is_left_out:
-            why = event.message.removeprefix(LEFT_OUT).removeprefix(": ")
-            self._line(event.at.steady, LEFT_OUT, event.node, why)
+            self._line(event.at.steady, LEFT_OUT, event.node, event.why_left_out)
             return
         self._line(event.at.steady, event.status.value, event.node, self._news(story, event))
 
