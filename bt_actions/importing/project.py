@@ -110,6 +110,8 @@ class Project:
         self.sorts = Sorts()
         self.types: dict[str, str] = {}
         """The type of a port that a variable is given to, by variable."""
+        self.updated: set[str] = set()
+        """Variables that one node both reads and writes."""
         self._alike: dict[str, set[str]] = {}
         """The variables that share a value with each variable."""
         self._given = {path.resolve().parent for path in paths}
@@ -349,7 +351,7 @@ class Project:
             yield from self._run(attributes.get(name, ""))
 
     def _of_ports(self, element: Element, kind: str) -> Iterator[tuple[str, str]]:
-        leaf, directions = self.mapping.leaves.get(kind), self.directions(kind)
+        leaf = self.mapping.leaves.get(kind)
         if leaf is None and (kind in _WITHOUT_PORTS or kind in rows()):
             return
         found = []
@@ -358,21 +360,24 @@ class Project:
             name = variable_in(text, port)
             if name is None or (used is not None and port not in used):
                 continue
-            found.append((name, directions.get(port, "input")))
-        yield from ((name, "r") for name, direction in found if direction != "output")
-        yield from ((name, "w") for name, direction in found if direction != "input")
+            found.append((name, self.direction(kind, port)))
+        read = [name for name, direction in found if direction != "output"]
+        written = [name for name, direction in found if direction != "input"]
+        self.updated.update({*read} & {*written})
+        yield from ((name, "r") for name in read)
+        yield from ((name, "w") for name in written)
 
-    def directions(self, kind: str) -> dict[str, str]:
-        """Return the directions of a kind's ports, as far as they are known."""
-        if kind in LOOPS:
-            return {"value": "output"}
-        if kind in WRITTEN_BY_KIND:
-            return {WRITTEN_BY_KIND[kind]: "output"}
+    def direction(self, kind: str, port: str) -> str:
+        """Return the direction of a port; where nothing tells it, its name does, as in Nav2."""
         leaf = self.mapping.leaves.get(kind)
-        known = dict(self.models.get(kind, {}))
-        if leaf is not None:
-            known.update(dict.fromkeys(leaf.outputs, "output"))
-        return known
+        if kind in LOOPS:
+            return "output" if port == "value" else "input"
+        if kind in WRITTEN_BY_KIND:
+            return "output" if port == WRITTEN_BY_KIND[kind] else "input"
+        if leaf is not None and port in leaf.outputs:
+            return "output"
+        named = "output" if leaf is None and port.startswith("output_") else "input"
+        return self.models.get(kind, {}).get(port, named)
 
     def _of_subtree(self, element: Element) -> Iterator[tuple[str, str]]:
         inner = self.trees.get(element.attributes.get("ID", ""))

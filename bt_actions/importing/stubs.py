@@ -83,10 +83,9 @@ def stub_of(project: Project, kind: str) -> Stub:
     held = {len(element.children) for element in uses}
     if held - {0}:
         stub.children = "one" if held == {1} else "many"
-    directions = project.directions(kind)
     for port in sorted({port for element in uses for port, _ in ports_of(element)}):
         texts = [element.attributes[port] for element in uses if port in element.attributes]
-        direction, type_name = directions.get(port, "input"), _type(project, kind, port, texts)
+        direction, type_name = project.direction(kind, port), _type(project, kind, port, texts)
         word = identifier(port)
         if direction != "output":
             everywhere = len(texts) == len(uses)

@@ -93,7 +93,8 @@ class Writer:
                 continue
             name = input_name(each, taken=scope[each] in outputs)
             kind = self.project.type_of(each)
-            begins_empty = "/" in kind and self.definition.writes(each)  # as a port of Nav2's does
+            is_given = each in self.project.updated or not self.definition.writes(each)
+            begins_empty = "/" in kind and not is_given  # as a port of Nav2's does
             inputs[name] = {"type": kind, "default": {}} if begins_empty else kind
             if scope[each] in outputs:
                 both[scope[each]] = f"${name}"
