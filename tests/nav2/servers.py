@@ -19,6 +19,7 @@ from typing import Any
 import rclpy
 from nav2_msgs.action import (
     BackUp,
+    ComputePathThroughPoses,
     ComputePathToPose,
     DockRobot,
     DriveOnHeading,
@@ -38,6 +39,7 @@ from bt_actions.simulation.journal import Event, Journal
 
 ACTIONS = {
     "compute_path_to_pose": (ComputePathToPose, 0.1),
+    "compute_path_through_poses": (ComputePathThroughPoses, 0.1),
     "follow_path": (FollowPath, 0.5),
     "spin": (Spin, 0.1),
     "backup": (BackUp, 0.1),
@@ -75,9 +77,10 @@ class Scripted(ScriptedServer):
         if finish is not Finish.REPLACED:
             self.arrives = None
         result = self.action_type.Result(error_code=motion.code)
-        if self.action_type is ComputePathToPose:  # each path differs from those before
+        if hasattr(result, "path"):  # which differs from those before
+            goal = motion.goal
             result.path.header.frame_id = f"path {self._intake.count}"
-            result.path.poses = [motion.goal.goal]
+            result.path.poses = goal.goals.goals if hasattr(goal, "goals") else [goal.goal]
         return result
 
     def on_request(self, request: Any) -> bool:

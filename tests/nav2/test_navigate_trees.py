@@ -36,6 +36,7 @@ pytestmark = [
 CLOSELY = "replanning_and_recovery"
 PLAN, FOLLOW, VALID = "compute_path_to_pose", "follow_path", "is_path_valid"
 LOCAL, GLOBAL = (f"{each}_costmap/clear_entirely_{each}_costmap" for each in ("local", "global"))
+THROUGH = "compute_path_through_poses"
 LONG = {"seconds": 60.0}
 NO_PROGRESS, NO_PATH, UNKNOWN_FRAME = 105, 208, 201  # of which no recovery mends the last
 
@@ -256,6 +257,16 @@ def test_following_a_point_that_moves(nav2: Nav2) -> None:
     assert followed["poses"][0]["pose"]["position"]["x"] == 7.0
     assert nav2.client.cancel(sent) == 1
     assert status(nav2, sent) == "canceled"
+
+
+def test_driving_through_the_poses_that_lie_ahead(nav2: Nav2) -> None:
+    nav2.play(follow_path={"seconds": 1.5}, **{THROUGH: {"fails": [NO_PATH]}})
+    goals = {"goals": [to(0.5), to(2.0), to(3.0)]}
+    assert status(nav2, nav2.send("through_poses", goals=goals)) == "succeeded"
+    assert nav2.order == [THROUGH, GLOBAL, THROUGH, FOLLOW, THROUGH, FOLLOW]
+    planned, followed = nav2.goals(THROUGH)[-1], nav2.goals(FOLLOW)[-1]
+    for poses in (planned["goals"]["goals"], followed["path"]["poses"]):
+        assert [each["pose"]["position"]["x"] for each in poses] == [2.0, 3.0]
 
 
 # What they stand on
