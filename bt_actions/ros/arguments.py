@@ -111,7 +111,7 @@ def _without_common(found: dict[str, Parameter]) -> dict[str, Parameter]:
 
 @contextlib.contextmanager
 def _understood() -> Iterator[None]:
-    """Turn rcl's words about a wrong argument into ours; rcl also logs its own."""
+    """Turn rcl's words about a wrong argument into ours, and keep rcl from logging its own."""
     set_logger_level("rcl", LoggingSeverity.FATAL)
     try:
         yield

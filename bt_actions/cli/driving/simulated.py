@@ -26,9 +26,9 @@ class Wanted:
     namespaces: Sequence[str]
     """The namespaces of the robots; "/" is the root. Never empty."""
     others: Sequence[str]
-    """The action servers that no simulated robot has, as `name (type)`."""
+    """The servers that no simulated robot has, as `name (type)`: of actions and of services."""
     services: Sequence[str] = ()
-    """The service servers that no simulated robot has."""
+    """The servers of services among these."""
 
 
 def wanted(root: Behaviour, namespace: str = "") -> Wanted:
