@@ -83,7 +83,7 @@ def __dir__() -> list[str]:
 
 
 class _XmlTags:
-    """Makes the tags of our leaves known where py_trees' parsers of XML trees are imported."""
+    """A hook that teaches py_trees' parsers of XML trees the tags of our leaves at import."""
 
     @staticmethod
     def find_spec(name: str, *_: object) -> None:

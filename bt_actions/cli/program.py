@@ -60,7 +60,7 @@ exit codes:
 
 
 class _Version(argparse.Action):
-    """Looks the version up on demand: the look takes 20 ms."""
+    """The option for the version, which is looked up on demand: the look takes 20 ms."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         write(f"bt-actions {_version()}\n")

@@ -51,7 +51,7 @@ class Table(NamedTuple):
 
 
 class Card(NamedTuple):
-    """What a page tells of a node beside its events.Node."""
+    """The words of a page about a node, beside its events.Node."""
 
     tables: tuple[Table, ...]
     yaml: str

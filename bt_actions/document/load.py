@@ -89,7 +89,7 @@ class Tree:
 
     @property
     def description(self) -> str:
-        """What the tree is for, in the words of its file; may be empty."""
+        """The purpose of the tree, in the words of its file; may be empty."""
         return str(self._document.values.get("description", ""))
 
     @property

@@ -1,4 +1,4 @@
-"""What leaves of BehaviorTree.CPP are here: a file of nodes of ours with ports in them.
+"""A map of BehaviorTree.CPP's leaves: a file of nodes of ours with ports in them.
 
 ```yaml
 import: {words.yaml: {move: my_msgs/action/Move}}    # what files declare, for trees that use it

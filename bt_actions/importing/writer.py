@@ -47,7 +47,7 @@ _CONCURRENT = re.compile(r"Parallel|Reactive|Pipeline|WhileDoElse|Switch|Timeout
 
 
 class Writer:
-    """Writes one tree."""
+    """The writer of one tree."""
 
     def __init__(
         self, project: Project, definition: Definition, kinds: dict[str, Handler],

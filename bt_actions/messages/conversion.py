@@ -129,7 +129,7 @@ def dotted(path: Iterable[str | int]) -> str:
 
 
 class _Filler:
-    """Walks type and data together; collects problems instead of raising at the first."""
+    """A walk through type and data together, which collects problems and does not raise."""
 
     def __init__(self, now: Callable[[], int], hole: Hole | None = None) -> None:
         """Take a clock; with a `hole`, whose values are not there yet, only the problems count."""

@@ -51,7 +51,7 @@ LOOPBACK = Place()
 
 
 class Guard:
-    """Refuses requests without a token, and those of other pages; confines our page by headers."""
+    """A guard against requests without a token, or of other pages; its headers confine our page."""
 
     def __init__(self, app: ASGIApp, place: Place, token: str, free: Collection[str]) -> None:
         """Guard `app`; `free` are the paths without a token."""

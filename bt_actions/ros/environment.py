@@ -25,7 +25,7 @@ _RANGES = ("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PE
 
 
 class Reach(Enum):
-    """How far a process sees and is seen, in ROS_AUTOMATIC_DISCOVERY_RANGE's words."""
+    """The range in which a process sees and is seen, as ROS_AUTOMATIC_DISCOVERY_RANGE has it."""
 
     NETWORK = ""
     MACHINE = "LOCALHOST"

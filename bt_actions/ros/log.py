@@ -35,7 +35,7 @@ STDERR = 2
 
 
 class _StandardError(logging.Handler):
-    """Writes as rclpy does, but with the interpreter's lock let go."""
+    """A handler that writes as rclpy does, but with the interpreter's lock let go."""
 
     def emit(self, record: logging.LogRecord) -> None:
         level = next((name for name, least in LEVELS.items() if record.levelno <= least), "fatal")
@@ -53,7 +53,7 @@ class _StandardError(logging.Handler):
 
 
 class Log:
-    """Takes lines from any thread; never raises and, but for `flush`, never waits."""
+    """The log, for lines from any thread; never raises and, but for `flush`, never waits."""
 
     def __init__(self, name: str) -> None:
         self._logger = logging.getLogger(name)

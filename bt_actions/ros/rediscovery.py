@@ -94,7 +94,7 @@ def look_for(endpoint: Endpoint, domain: int, enclave: str) -> None:
 
 
 class Rediscovery:
-    """Looks for the servers that endpoints of one ROS domain, and one enclave, miss.
+    """The looks for servers that endpoints of one ROS domain, and one enclave, miss.
 
     One thread makes all looks, and waits for the next missed server: a thread for each look would
     leave another megabyte behind, because glibc keeps what a thread took for later threads. This

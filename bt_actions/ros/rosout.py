@@ -23,7 +23,7 @@ Tell = Callable[[Level, str], None]
 
 
 class Rosout:
-    """Publishes on `/rosout` for one node, on any thread; to be closed before the node is gone."""
+    """A publisher on `/rosout` for one node, on any thread; to be closed before its node goes."""
 
     def __init__(self, node: Node) -> None:
         self._node, self._name = node, node.get_fully_qualified_name()

@@ -47,7 +47,7 @@ os.register_at_fork(after_in_child=_users_lock._at_fork_reinit)  # type: ignore[
 
 
 class Spinner:
-    """Owns what the caller did not bring (context, node, executor) and spins what it may.
+    """The owner of what the caller did not bring (context, node, executor), which spins the node.
 
     - No node: a context and a node of its own.
     - An executor that holds no node yet, or none: spun here, on a thread of its own.

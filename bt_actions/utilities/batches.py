@@ -15,7 +15,7 @@ BEAT = 1.0
 
 
 class Batches:
-    """Calls `step` on a thread of its own, from `start` until `close`.
+    """A thread that calls `step`, from `start` until `close`.
 
     `step` gets True at its last call. An exception of a step is logged: others have work for the
     same thread.

@@ -16,7 +16,7 @@ _Jobs = queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None]
 
 
 class Patience:
-    """Does one piece of work after another on a thread of its own, with a bounded wait for each.
+    """A thread that does one piece of work after another, with a bounded wait for each.
 
     The wait is `seconds`, and half as long for each further piece that hangs, as many files may lie
     on one stuck mount. A context manager, at whose end the thread goes; for one user at a time.

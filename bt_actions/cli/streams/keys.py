@@ -14,7 +14,7 @@ _ARROWS = {"A": "up", "B": "down", "C": "right", "D": "left"}
 
 
 class Keys:
-    """Takes keys from `__enter__` to `__exit__`; Ctrl-C is a signal as ever, Ctrl-Z a key."""
+    """The keys from `__enter__` to `__exit__`; Ctrl-C is a signal as ever, Ctrl-Z a key."""
 
     def __init__(self, fileno: int) -> None:
         """Take the descriptor of a terminal."""

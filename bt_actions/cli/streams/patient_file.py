@@ -44,7 +44,7 @@ def gap_text(lines: int) -> str:
 
 
 class PatientFile(io.RawIOBase):
-    """Takes bytes without ever waiting; a thread writes them to a file descriptor."""
+    """A file that takes bytes without ever waiting; a thread writes them to a descriptor."""
 
     def __init__(self, descriptor: int, name: str) -> None:
         self._descriptor = descriptor

@@ -1,4 +1,4 @@
-"""What is wrong with a document beyond its form: names, types and hazards.
+"""The checks of a document beyond its form: names, types and hazards.
 
 Reports to the documents' sources; changes no document, and makes no behaviour.
 """

@@ -80,7 +80,7 @@ class _GaveUp(Exception):
 
 
 class _Composer:
-    """Puts events together by recursion, no deeper than `MAX_DEPTH`."""
+    """A composer of events, by recursion no deeper than `MAX_DEPTH`."""
 
     def __init__(self, source: Source, *, unfold: bool = True) -> None:
         if not yaml.__with_libyaml__:

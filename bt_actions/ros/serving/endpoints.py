@@ -33,7 +33,7 @@ def kept(depth: int) -> QoSProfile:
 
 
 class Endpoints:
-    """Makes the endpoints, and takes them away."""
+    """The endpoints of one server, made here and taken away together."""
 
     def __init__(self, node: Node) -> None:
         self.node = node

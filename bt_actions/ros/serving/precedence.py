@@ -34,7 +34,7 @@ _CLAIM = re.compile(r"/_since/t\d{20}_[0-9a-f]{32}$")
 
 
 class Precedence:
-    """Looks once a second for servers with precedence over one server of an action, and says so."""
+    """A look once a second for servers with precedence over one server of an action."""
 
     def __init__(self, endpoints: Endpoints, action: str, say: Tell) -> None:
         self._node, self._say = endpoints.node, say

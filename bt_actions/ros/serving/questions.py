@@ -47,7 +47,7 @@ class _Question:
 
 
 class Asker:
-    """Hears topics and calls services on a node, which it spins itself."""
+    """A node that hears topics and calls services, and is spun here."""
 
     def __init__(self, node: Node) -> None:
         self._node = node
