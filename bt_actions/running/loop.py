@@ -69,7 +69,7 @@ class TickLoop:
         wake: Callable[[], None] = lambda: None,
         ready: Callable[[], None] = lambda: None,
         check: Callable[[], None] = lambda: None,
-        misbehaved: Callable[[], str] = lambda: "",
+        misbehaved: Callable[[], str] | None = None,
     ) -> None:
         """Make the loop; `begin` begins a run.
 
@@ -143,8 +143,13 @@ class TickLoop:
         self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
         self._error = self._drain = None
         self._status, self._burst = Status.INVALID, 0
+        teller = self.teller
         self._visitor = ChangeVisitor(
-            self._set_up_missing, self._after_each, self.teller.changed, self.teller.goes_on
+            self._set_up_missing,
+            self._after_each,
+            teller.changed,
+            teller.goes_on,
+            lambda: teller.is_heard,
         )
         self.teller.begin()
         self.goals.run_goes_on = True
@@ -263,11 +268,12 @@ class TickLoop:
         return changed
 
     def _after_each(self) -> str:
-        if self.watchdog.seen:
-            self.watchdog.tick_returned()
-        if self.watchdog.ends_at < math.inf and self.watchdog.gives_up():
+        dog, misbehaved = self.watchdog, self._misbehaved
+        if dog.seen:
+            dog.tick_returned()
+        if dog.ends_at < math.inf and dog.gives_up():
             raise _Abandoned
-        return self._misbehaved()
+        return "" if misbehaved is None else misbehaved()
 
     @property
     def _has_others(self) -> bool:

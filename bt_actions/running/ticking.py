@@ -67,16 +67,18 @@ class ChangeVisitor(VisitorBase):
         after_each: Callable[[], str],
         tell: Callable[[Behaviour], None] = lambda behaviour: None,
         settle: Callable[[Behaviour], None] = lambda behaviour: None,
+        is_heard: Callable[[], bool] = lambda: True,
     ) -> None:
         """Make the visitor; `before` is called between a tick's handlers and its first behaviour.
 
-        `after_each` is called when a behaviour has ticked, and returns a fault of it. `tell` is
-        called then, where its status is new or its visit ends, and for stopped behaviours; `settle`
-        for each that goes on running.
+        `after_each` is called when a behaviour has ticked, and returns a fault of it. In a tick at
+        whose beginning `is_heard` holds, `tell` is called then, where its status is new or its
+        visit ends, and `settle` where it goes on running. For a stopped behaviour, `tell` is always
+        called.
         """
         super().__init__(full=False)
         self._before, self._after_each, self._tell = before, after_each, tell
-        self._settle = settle
+        self._settle, self._is_heard = settle, is_heard
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
         self._kinds = {Behaviour}  # of visited nodes; any class, for a tree that shows nothing
@@ -102,7 +104,7 @@ class ChangeVisitor(VisitorBase):
         """
         after_each, visited, none = self._after_each, self._visited, Status.INVALID
         live, running, tell, settle = self._live, Status.RUNNING, self._tell, self._settle
-        known = self._known
+        known, heard = self._known, self._is_heard()
         for behaviour in ticked:
             for visitor in others:
                 behaviour.visit(visitor)
@@ -117,12 +119,14 @@ class ChangeVisitor(VisitorBase):
                 live.pop(behaviour, None)
                 if known.get(behaviour) is not status:
                     known[behaviour], self._changed = status, True
-                tell(behaviour)
+                if heard:
+                    tell(behaviour)
             elif behaviour not in live:
                 live[behaviour] = None
                 known[behaviour], self._changed = status, True
-                tell(behaviour)
-            else:
+                if heard:
+                    tell(behaviour)
+            elif heard:
                 settle(behaviour)
             if wrong := after_each():
                 raise Misbehaviour(behaviour, wrong)
