@@ -114,7 +114,7 @@ _SHARED: dict[str, dict[str, Any]] = {
     "--json": {"action": "store_true", "help": "print one JSON object a line, the result last"},
     "--quiet": {
         "action": "store_true",
-        "help": "show only what went wrong; the exit code tells",
+        "help": "show only failures; the exit code tells the end",
     },
     "--publish-values": {
         "action": "store_true",

@@ -42,7 +42,7 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "call",
-        help="have a server of trees run one",
+        help="let a server of trees run one",
         description="Have a server of trees (`bt-actions serve`) run a tree; show how it goes.",
         epilog=_EPILOG,
     )
@@ -53,14 +53,14 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="NAME",
         type=action_name,
         default="run_tree",
-        help="its action; run_tree if not given",
+        help="action of the server; run_tree if not given",
     )
     add_option(parser, "--namespace", help="namespace of the server")
     add_option(parser, "--timeout")
     add_option(parser, "--json")
     add_option(parser, "--quiet")
     add_options(parser, one_run=True)
-    add_ros_args(parser, "; parameters (-p NAME:=VALUE) give inputs their values as of `run`")
+    add_ros_args(parser, "; parameters (-p NAME:=VALUE) give inputs their values as for `run`")
 
 
 def run(args: argparse.Namespace) -> int:

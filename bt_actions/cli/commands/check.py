@@ -30,7 +30,7 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "check",
-        help="find what is wrong with trees",
+        help="find mistakes in trees",
         description="Check trees, with all that they include, against the language and the ROS "
         "types that are installed.",
         epilog=_EPILOG,
@@ -48,7 +48,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "--format",
         choices=("text", "json"),
         default="text",
-        help="how findings are written (default: text)",
+        help="format of the findings (default: text)",
     )
 
 

@@ -44,7 +44,7 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "cleanup",
-        help="cancel what a killed orchestrator left",
+        help="cancel the goals of a killed orchestrator",
         description="Cancel the goals that killed bt_actions processes of this machine left.",
         epilog=_EPILOG,
     )
@@ -56,21 +56,21 @@ def add_parser(subparsers: Subparsers) -> None:
         help="wait for its server for up to 30 s, and fail where that is not in sight",
     )
     parser.add_argument(
-        "--look", metavar="S", type=seconds, default=5.0, help="look for servers so long [5 s]"
+        "--look", metavar="S", type=seconds, default=5.0, help="time to look for servers [5 s]"
     )
     parser.add_argument(
         "--patience",
         metavar="S",
         type=seconds,
         default=5.0,
-        help="wait so long for the goals to end [5 s]",
+        help="time for the goals to end [5 s]",
     )
     parser.add_argument(
         "--accept",
         metavar="S",
         type=seconds,
         default=0.0,
-        help="a server may take so long to accept a goal [30 s, or the timeout.accept of the goal]",
+        help="time for a server to accept a goal [30 s, or the timeout.accept of the goal]",
     )
     add_ros_args(parser)
 

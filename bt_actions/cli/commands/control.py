@@ -38,10 +38,13 @@ def add_parser(subparsers: Subparsers) -> None:
         epilog=_EPILOG,
     )
     parser.add_argument(
-        "server", metavar="SERVER", type=action_name, help="its action, such as /r1/run_tree"
+        "server",
+        metavar="SERVER",
+        type=action_name,
+        help="action of the server, such as /r1/run_tree",
     )
     parser.add_argument(
-        "wish", metavar="pause|resume|halt", choices=tuple(_DONE), help="what to do with the run"
+        "wish", metavar="pause|resume|halt", choices=tuple(_DONE), help="the change of the run"
     )
     parser.add_argument("goal", metavar="ID", nargs="?", default="", help="which run")
     add_option(parser, "--namespace", help="namespace of the server, where SERVER has no slash")

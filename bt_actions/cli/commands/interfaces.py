@@ -90,7 +90,9 @@ def add_parser(subparsers: Subparsers) -> None:
         description="List the actions, services and messages that are installed.",
         epilog=_LIST,
     )
-    listing.add_argument("packages", metavar="PACKAGE", nargs="*", help="only those of it")
+    listing.add_argument(
+        "packages", metavar="PACKAGE", nargs="*", help="only types of this package"
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -35,7 +35,7 @@ def add_parser(subparsers: Subparsers) -> None:
         description="Show the trees that servers of trees (`bt-actions serve`) offer.",
         epilog=_EPILOG,
     )
-    add_option(parser, "--namespace", help="only servers in or below it")
+    add_option(parser, "--namespace", help="only servers in or below this namespace")
     add_option(parser, "--json", help="print one JSON object")
     add_ros_args(parser)
 

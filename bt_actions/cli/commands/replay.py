@@ -52,7 +52,7 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "replay",
-        help="see a recorded run again",
+        help="play a recorded run again",
         description="Play a recorded run in the terminal, drawn as `bt-actions run` draws it.",
         epilog=_EPILOG,
     )
@@ -67,7 +67,10 @@ def add_parser(subparsers: Subparsers) -> None:
     add_option(parser, "--json", help="write the run at once, one JSON object a line, as run does")
     parser.add_argument("--plain", action="store_true", help="lines at once, in a terminal, too")
     parser.add_argument(
-        "-v", "--verbose", action="store_true", help="of lines: one for every state of every goal"
+        "-v",
+        "--verbose",
+        action="store_true",
+        help="among lines, write one for every state of every goal",
     )
 
 

@@ -33,7 +33,7 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "report",
-        help="tell why a recorded run failed, and all that it did",
+        help="tell why a recorded run failed, and everything it did",
         description="Tell a recorded run: why it failed, its actions, and what happened when.",
         epilog=_EPILOG,
     )

@@ -48,7 +48,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser(
         "run",
         help="run a tree",
-        description="Run a tree. In a terminal it is drawn live; elsewhere each change is a line.",
+        description="Run a tree. A terminal shows the tree live; elsewhere each change is a line.",
         epilog=_EPILOG,
     )
     parser.add_argument("tree", metavar="TREE", help="path of a tree, or name of an installed one")
@@ -69,21 +69,21 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--cleanup-first",
         action="store_true",
-        help="cancel what a killed orchestrator of this machine left, before the tree starts; "
-        "waits 30 s for the tree's servers, and does not run where it cannot see what was left",
+        help="cancel the goals of a killed orchestrator of this machine before the tree starts; "
+        "wait 30 s for the tree's servers, and do not run where goals may be left unseen",
     )
     add_option(parser, "--no-python")
     add_option(parser, "--json")
     parser.add_argument(
         "--plain",
         action="store_true",
-        help="lines in a terminal, too, as in a pipe; so it is where TERM is dumb",
+        help="write lines in a terminal, too, as in a pipe, and as where TERM is dumb",
     )
     parser.add_argument(
         "-v",
         "--verbose",
         action="store_true",
-        help="where the run is shown as lines: one for every state of every goal",
+        help="among lines, write one for every state of every goal",
     )
     add_ros_args(
         parser,

@@ -52,7 +52,7 @@ def add_parser(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--all", action="store_true", help="with prune: remove all runs")
     parser.add_argument(
-        "--failed", action="store_true", help="only those that failed or never finished"
+        "--failed", action="store_true", help="only runs that failed or never finished"
     )
     parser.add_argument("--tree", metavar="NAME", default="", help="only runs of this tree")
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")

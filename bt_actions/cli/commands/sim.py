@@ -71,7 +71,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--journal",
         metavar="FILE",
-        help="append what happens to every goal, one JSON object a line",
+        help="append the events of every goal, one JSON object a line",
     )
     add_option(parser, "--executor")
     add_ros_args(parser)

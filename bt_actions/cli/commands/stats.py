@@ -45,7 +45,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--simulated",
         action="store_true",
-        help="only runs in a simulation, which else are left out",
+        help="only runs in a simulation, which are left out otherwise",
     )
     add_option(parser, "--json", help="print one JSON object")
 

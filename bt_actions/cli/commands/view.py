@@ -36,7 +36,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "view",
         help="show a run on a page, live or from its recording",
         description="Serve a page that shows a run, to browsers of this computer: what runs and "
-        "waits, why it failed, and all that happened. Its address is the one line of output.",
+        "waits, why the run failed, and all that happened. The one line of output is its address.",
         epilog=_EPILOG,
     )
     parser.add_argument(
@@ -62,7 +62,10 @@ def add_parser(subparsers: Subparsers) -> None:
         "--certificate", metavar="FILE", type=Path, help="certificate of that host, as PEM"
     )
     parser.add_argument(
-        "--key", metavar="FILE", type=Path, help="its private key, where FILE does not hold that"
+        "--key",
+        metavar="FILE",
+        type=Path,
+        help="private key of the certificate, where FILE does not hold it",
     )
 
 

@@ -38,9 +38,9 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "watch",
-        help="see what runs now, in a terminal",
-        description="Tell of each run that goes on what it does and waits for, and of one that "
-        "ends how, and why. Goes on until Ctrl-C.",
+        help="watch the runs that go on, in a terminal",
+        description="Tell what each run that goes on does and waits for, and the end of a run "
+        "with its cause, until Ctrl-C.",
         epilog=_EPILOG,
     )
     parser.add_argument(

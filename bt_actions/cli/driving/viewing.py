@@ -17,7 +17,7 @@ def add_option(parser: argparse.ArgumentParser) -> None:
         "--view",
         action="store_true",
         help="print the address of this user's page; where no `bt-actions view` runs, one is "
-        "started, which ends when nobody has looked for ten minutes",
+        "started, which ends after ten minutes without a browser",
     )
 
 

@@ -30,7 +30,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "import",
         help="write trees of BehaviorTree.CPP and Nav2 as trees of ours",
         description="Write the trees of BehaviorTree.CPP's XML (3 and 4) as YAML, one file a tree. "
-        "Each node that cannot be said is a failure in its place, and told.",
+        "A failure, and a line of the report, stand for each node that has no equal here.",
         epilog=_EPILOG,
     )
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="a file of XML")
@@ -41,7 +41,7 @@ def add_parser(subparsers: Subparsers) -> None:
         "--map",
         metavar="FILE",
         type=Path,
-        help="what your own leaves are here; Nav2's are known",
+        help="the leaves here for those of your own; Nav2's are known",
     )
     parser.add_argument(
         "--report",
