@@ -146,9 +146,10 @@ window.shown = (run, count) => {
     [...s.status].slice(0, 3), [...s.message].slice(0, 3), [...s.from].slice(0, 3), [...s.running], [...s.vars].map(([name, e]) => [name, e.value]),
     [...s.round].map(([n, e]) => [n, e.number]), [...s.due], [...s.up], s.dealt.map((one) => [one.n, one.number, one.by]),
     [...s.pending].map(([n, all]) => [n, all.map((one) => one.number)]), s.finished?.status, s.stop?.why, s.lasting?.n, s.paused, s.lost,
-    run.attempts.filter((a) => a.start <= t).map((a) => [a.id, phases(a), a.done <= t]),
+    run.attempts.filter((a) => a.start <= t).map((a) => [a.id, phases(a), words.story(a, run.nodes[a.n], t)]),
   ]);
 };
+return import("/words.js").then((words) => { window.words = words; });
 """  # noqa: E501
 """What the store of a page says behind so many events, of the nodes that are there all along."""
 

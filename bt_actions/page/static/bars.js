@@ -122,7 +122,7 @@ export class Bars {
       failed = !open && a.oc !== "SUCCEEDED";
     bar.el.setAttribute(
       "aria-label",
-      `${node.name}, attempt ${a.a}, ${open ? PHASE_WORD[a.phases.at(-1).st] : a.oc}, from ${clock(a.start)}`,
+      `${node.name}, attempt ${a.a}, ${open ? PHASE_WORD[a.phases.at(-1).st] : (a.oc ?? "not recorded")}, from ${clock(a.start)}`,
     );
     bar.el.replaceChildren(
       ...phases(a, head, bar.a, bar.b, (t) => span.x_of(t), open ? null : a.done),

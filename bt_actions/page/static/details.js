@@ -3,7 +3,7 @@
 
 import { el } from "./dom.js";
 import { status_glyph, kind_glyph } from "./glyphs.js";
-import { clock, secs, STATE, story, place, end_words } from "./words.js";
+import { clock, secs, STATE, story, said_by, place, end_words } from "./words.js";
 import { phase_at, because, waiting_for } from "./doing.js";
 import { live, messages, policies } from "./goal.js";
 import { phases } from "./phases.js";
@@ -28,7 +28,7 @@ export function create_details(app) {
       chosen = pick?.n === sel ? run.attempts[pick.a] : null,
       tries = run.attempts_of(sel, t, chosen);
     const at = tries.includes(chosen) ? chosen : tries.at(-1);
-    const now = `${sel}|${view.st}|${at?.g}|${tries.map((a) => `${a.done <= t}${phase_at(a, t)?.st}`).join()}|${at?.fb[0]?.t <= t}`;
+    const now = `${sel}|${view.st}|${at?.g}|${tries.map((a) => `${a.done <= t}${phase_at(a, t)?.st}${said_by(a, t)?.oc}`).join()}|${at?.fb[0]?.t <= t}`;
     if (now !== key) {
       const same = key.split("|")[0] === String(sel),
         top = box.scrollTop;
@@ -91,16 +91,17 @@ export function create_details(app) {
       first = tries[0].start,
       body = tries.map((a) => {
         const over = a.done <= t,
+          oc = said_by(a, t)?.oc,
           look = !over
             ? STATE[phase_at(a, t)?.st || "running"][1]
-            : a.oc === "SUCCEEDED"
+            : oc === "SUCCEEDED"
               ? "success"
-              : a.oc === "CANCELED"
+              : oc === "CANCELED" || !oc
                 ? "stopped"
                 : "failure";
         const outcome = el("span", { class: "oc" });
         outcome.append(status_glyph(look));
-        outcome.append(over ? a.oc : STATE[phase_at(a, t)?.st || "running"][0]);
+        outcome.append(over ? (oc ?? "not recorded") : STATE[phase_at(a, t)?.st || "running"][0]);
         const accepted =
           a.accepted <= t
             ? `+${secs(a.accepted - (a.phases.find((p) => p.st === "sent")?.from ?? a.start))}`

@@ -1,6 +1,6 @@
 // What a node does at one time, since when, until when and by which rule: bt_actions/story/doing.py says the same.
 
-import { DEADLINE, secs, clock } from "./words.js";
+import { DEADLINE, secs, clock, said_by } from "./words.js";
 import { upper, is_begun } from "./state.js";
 
 export const phase_at = (a, t) => (a.done <= t ? null : a.phases.findLast((phase) => phase.from <= t) || null);
@@ -93,6 +93,7 @@ export function branch_of(run, n, s) {
 
 export function waiting_for(node, view, s) {
   const a = view.attempt,
+    said = a && said_by(a, s.t),
     of = a && node.retry.attempts > 1 ? `, attempt ${a.a} of ${node.retry.attempts}` : "",
     rule = view.rule ? ` · ${view.rule}` : "";
   if (view.drains) return `interrupted; the end of its goal ${a.g} is awaited${rule}`;
@@ -110,9 +111,9 @@ export function waiting_for(node, view, s) {
     case "sent":
       return `sent to ${node.server}, not answered yet${rule}`;
     case "backoff":
-      return `until attempt ${a.a + 1} of ${node.retry.attempts}, after ${a.oc}${rule}`;
+      return `until attempt ${a.a + 1} of ${node.retry.attempts}, after ${said.oc}${rule}`;
     case "cancel":
-      return `${a.oc || ""}: canceled, its end is awaited${rule}`;
+      return `${said ? `${said.oc}: ` : ""}canceled, its end is awaited${rule}`;
     case "running":
       return "between two children";
     default:

@@ -67,7 +67,7 @@ export function messages(node, at, t, ticking) {
         { style: "margin:6px 0 0" },
         "Expected: ",
         el("code", { text: node.expect }),
-        at.verdict?.expect
+        at.verdict?.expect && at.verdict.t <= t
           ? ` did not hold: ${Object.entries(at.verdict.seen)
               .map(([name, value]) => `${name} is ${written(value)}`)
               .join(", ")}`

@@ -1,13 +1,15 @@
 // The phases of an attempt as boxes, in the timeline and in the details.
 
 import { el } from "./dom.js";
+import { said_by } from "./words.js";
 
 export const px = (value) => `${value.toFixed(1)}px`;
 
 // From x0 to x1; `x_of` gives the place of a time.
 export function phases(a, head, x0, x1, x_of, done) {
   const out = [],
-    tone = done === null ? "" : a.oc === "SUCCEEDED" ? " o-success" : a.oc === "CANCELED" ? " o-stopped" : " o-failure";
+    oc = done === null ? null : said_by(a, head)?.oc,
+    tone = !oc ? "" : oc === "SUCCEEDED" ? " o-success" : oc === "CANCELED" ? " o-stopped" : " o-failure";
   for (const phase of a.phases) {
     if (phase.from > head) continue;
     const from = Math.max(x0, x_of(phase.from)),

@@ -64,7 +64,7 @@ function words(app, { n, attempt: a, from, to }) {
   const told = a.phases
     .filter((p) => p.to - p.from > 0.02)
     .map((p) => `${PHASE_WORD[p.st]} ${secs(until(p.to) - p.from)}`);
-  const ending = a.done < Infinity ? `; ${a.oc}` : "",
+  const ending = a.done < Infinity ? `; ${a.oc ?? "not recorded"}` : "",
     again = a.backoff ? `, then backoff ${secs(a.backoff - a.done)}` : "";
   return [
     el("b", { text: `${node.name}, attempt ${a.a} of ${node.retry.attempts}` }),

@@ -38,6 +38,7 @@ export const TAKE = {
         goal: null,
         result: null,
         oc: null,
+        said: [],
         end: e.end,
         why: "",
         verdict: null,
@@ -186,8 +187,9 @@ export const TAKE = {
 };
 
 function decide(run, a, e) {
+  if (a.oc !== e.outcome) a.decided = e.t;
   a.oc = e.outcome;
-  a.decided ||= e.t;
+  a.said.push({ t: e.t, oc: e.outcome, why: e.reason || a.why });
   run.decided++;
 }
 function remember(run, e) {

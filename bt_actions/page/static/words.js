@@ -95,9 +95,13 @@ const END = {
 };
 export const end_words = (end) => END[end] || "";
 
+// What had been said of an attempt by t: its goal comes to an end first, and is judged by its leaf behind that.
+export const said_by = (attempt, t) => attempt.said.findLast((one) => one.t <= t);
+
 // One attempt as a sentence, as far as it had come at t.
 export function story(attempt, node, t) {
   const parts = [],
+    said = said_by(attempt, t),
     told = attempt.phases.filter((phase) => phase.from <= t);
   const took = (phase) => secs(Math.min(phase.to, t) - phase.from);
   for (const phase of told) {
@@ -111,7 +115,7 @@ export function story(attempt, node, t) {
     if (phase.st === "sent")
       parts.push(
         over
-          ? attempt.oc === "REJECTED" && attempt.done <= t
+          ? said?.oc === "REJECTED"
             ? `rejected after ${took(phase)}`
             : `accepted after ${took(phase)}`
           : `sent ${took(phase)} ago, no answer yet`,
@@ -122,8 +126,9 @@ export function story(attempt, node, t) {
   }
   let text = parts.join(", ");
   if (attempt.done <= t) {
-    if (attempt.oc === "SUCCEEDED") text += "; succeeded";
-    else text += `. ${attempt.oc}: ${attempt.why.split(": interrupted")[0]}. On the server: ${end_words(attempt.end)}`;
+    if (!said) text += ". How it ended is not recorded";
+    else if (said.oc === "SUCCEEDED") text += "; succeeded";
+    else text += `. ${said.oc}: ${said.why.split(": interrupted")[0]}. On the server: ${end_words(attempt.end)}`;
   }
   return text.charAt(0).toUpperCase() + text.slice(1) + ".";
 }
