@@ -164,7 +164,7 @@ def test_a_page_that_nobody_sees_keeps_no_stream_and_misses_nothing(
     opened.open(f"{served.address}&run={RUN_ID}")
     assert opened.wait_for("page.shown")
     opened.run(hide, True)
-    assert opened.run("return page.link.source.readyState") == 2
+    assert opened.run("return page.link.stream.source.readyState") == 2
     run.write(events[8:])
     opened.run(hide, False)
     assert opened.wait_for("page.run.events.length === arguments[0]", len(events))

@@ -39,6 +39,10 @@ class Browser:
         page.on("console", lambda message: self._said.append(message.text))
         page.on("pageerror", lambda error: self._said.append(str(error)))
 
+    def tab(self) -> Browser:
+        """Another tab of the same browser."""
+        return Browser(self.page.context.new_page())
+
     def open(self, path: Path | str, width: int = 1200, height: int = 800) -> None:
         """Show a file or an address anew, in a window of so many pixels inside."""
         self.page.set_viewport_size({"width": width, "height": height})
@@ -74,4 +78,4 @@ def browser() -> Iterator[Browser]:
             executable_path=_chromium(), args=FLAGS, ignore_default_args=["--hide-scrollbars"]
         )
         with chromium:
-            yield Browser(chromium.new_page())
+            yield Browser(chromium.new_context().new_page())

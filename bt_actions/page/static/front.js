@@ -4,6 +4,7 @@
 import { el } from "./dom.js";
 import { status_glyph } from "./glyphs.js";
 import { look_of } from "./head.js";
+import { Stream } from "./stream.js";
 import { clock } from "./words.js";
 
 const text = (node, value) => {
@@ -64,16 +65,15 @@ export class Front {
   }
 
   open() {
-    this.source = new EventSource("/now");
-    this.source.addEventListener("now", ({ data }) => this.show(JSON.parse(data).runs));
-    this.source.onerror = () => {
+    const lose = () => {
       this.since ??= new Date().toLocaleTimeString();
       text(this.lost, `The server is not to be had since ${this.since}: what is shown is how the runs stood then.`);
       this.grid.classList.add("old");
     };
+    this.stream = new Stream("/now", { hear: (_, data) => this.show(JSON.parse(data).runs), lose });
   }
   close() {
-    this.source.close();
+    this.stream.close();
   }
   hide(hidden) {
     this.close();

@@ -4,6 +4,8 @@
 // of that is recorded), "lost" (no stream), "gone" (the run's process is), "replay" (the run is over). No time is made
 // up: `head` goes on for at most AHEAD seconds behind a sign of life.
 
+import { Stream } from "./stream.js";
+
 const STALE = 2.5,
   AHEAD = 1.2,
   LONGEST = 15;
@@ -32,55 +34,57 @@ export class Link {
   }
 
   open() {
-    clearTimeout(this.retry);
+    this.close();
     this.next = 0;
-    const { run } = this,
-      source = (this.source = new EventSource(
-        `/run/${encodeURIComponent(run.key)}/events?after=${encodeURIComponent(`${run.key}:${run.number}`)}`,
-      ));
-    source.addEventListener("events", ({ data }) => {
-      this.tries = 0;
-      if (!run.take(JSON.parse(data))) return this.reset(); // never shown with a gap
-      this.sign(run.clock);
+    const { run } = this;
+    this.stream = new Stream(`/run/${encodeURIComponent(run.key)}/events`, {
+      number: () => run.number,
+      from: () => `?after=${encodeURIComponent(`${run.key}:${run.number}`)}`,
+      hear: (kind, data) => this[kind](JSON.parse(data)),
+      lose: () => this.lose(),
     });
-    source.addEventListener("beat", ({ data }) => {
-      const { clock, tick, damaged, unrecorded } = JSON.parse(data);
-      this.tries = 0;
-      this.tick = tick;
-      this.is_open = true;
-      Object.assign(this, { damaged, unrecorded });
-      if (clock !== null && clock !== this.last_beat && run.began) {
-        this.last_beat = clock;
-        this.sign(Math.max(run.clock, clock - run.began[2]));
-      }
-      this.look();
-      this.told("settled");
-    });
-    source.addEventListener("end", ({ data }) => {
-      const { ended, ago, unrecorded, outcome } = JSON.parse(data);
-      run.over = true;
-      this.close();
-      Object.assign(this, { ended, outcome, unrecorded: unrecorded || this.unrecorded });
-      this.signed = performance.now() - ago * 1000;
-      this.set(ended || this.unrecorded ? "replay" : "gone");
-    });
-    source.addEventListener("reset", () => this.told("reset"));
-    source.addEventListener("broken", ({ data }) => {
-      this.why = JSON.parse(data).why;
-      run.over = true;
-      this.close();
-      this.set("replay");
-    });
-    source.onerror = () => {
-      this.close();
-      this.is_open = false;
-      this.tries++;
-      const wait = Math.min(LONGEST, 2 ** (this.tries - 1));
-      this.next = performance.now() + wait * 1000;
-      this.retry = setTimeout(() => this.open(), wait * 1000);
-      this.look();
-      this.told("lost");
-    };
+  }
+
+  // What the stream tells.
+  events(batch) {
+    this.tries = 0;
+    if (!this.run.take(batch)) return this.reset(); // never shown with a gap
+    this.sign(this.run.clock);
+  }
+  beat({ clock, tick, damaged, unrecorded }) {
+    const { run } = this;
+    this.tries = 0;
+    this.is_open = true;
+    Object.assign(this, { tick, damaged, unrecorded });
+    if (clock !== null && clock !== this.last_beat && run.began) {
+      this.last_beat = clock;
+      this.sign(Math.max(run.clock, clock - run.began[2]));
+    }
+    this.look();
+    this.told("settled");
+  }
+  end({ ended, ago, unrecorded, outcome }) {
+    this.run.over = true;
+    this.close();
+    Object.assign(this, { ended, outcome, unrecorded: unrecorded || this.unrecorded });
+    this.signed = performance.now() - ago * 1000;
+    this.set(ended || this.unrecorded ? "replay" : "gone");
+  }
+  broken({ why }) {
+    this.why = why;
+    this.run.over = true;
+    this.close();
+    this.set("replay");
+  }
+  lose() {
+    this.close();
+    this.is_open = false;
+    this.tries++;
+    const wait = Math.min(LONGEST, 2 ** (this.tries - 1));
+    this.next = performance.now() + wait * 1000;
+    this.retry = setTimeout(() => this.open(), wait * 1000);
+    this.look();
+    this.told("lost");
   }
 
   reset() {
@@ -89,7 +93,7 @@ export class Link {
   }
   close() {
     clearTimeout(this.retry);
-    this.source?.close();
+    this.stream?.close();
   }
   // A page that is not seen keeps no stream; when it is seen again, what was missed comes first.
   hide(hidden) {

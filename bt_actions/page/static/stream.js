@@ -1,0 +1,63 @@
+// One stream for all tabs of this browser that show the same: a browser has six connections to a server at a time.
+//
+// Each tab opens a stream of its own, from the event behind the last one that it has. The tab that holds the lock of the
+// address leads: it hands on what its stream tells, each message with the number of the event before. A tab that has that
+// event takes the message, and closes its own stream; one that lacks some opens its own again, from where it is: so there
+// is never a gap, nor does a tab need to know who leads. When the leader closes, its lock goes to another tab, which goes
+// on from where it is. A tab that hears nothing for long, as where the leader stands still, opens its own stream, too.
+//
+// A tab that nobody sees takes no part: link.js and front.js close its stream. Tabs that show different runs have a
+// stream each. Where a browser has no Web Locks, each tab has its own.
+
+const KINDS = ["events", "beat", "end", "reset", "broken", "now"];
+const SILENT = 3000; // milliseconds; the server has something to tell each second
+
+export class Stream {
+  // `number()` is that of the last event that this tab has, `from()` is how the address says it; `hear` takes the kind and
+  // the data of a message, `lose` is called where the server is not to be had.
+  constructor(path, { number = () => 0, from = () => "", hear, lose }) {
+    Object.assign(this, { path, number, from, hear, lose, leads: false, is_closed: false });
+    this.open();
+    if (!navigator.locks) return;
+    this.channel = new BroadcastChannel(path);
+    this.channel.onmessage = ({ data }) => this.follow(data);
+    const over = new Promise((resolve) => (this.release = resolve));
+    navigator.locks.request(path, () => {
+      this.leads = true;
+      if (!this.is_closed) this.ensure();
+      return over;
+    });
+  }
+
+  open() {
+    clearTimeout(this.silent);
+    const source = (this.source = new EventSource(this.path + this.from()));
+    for (const kind of KINDS)
+      source.addEventListener(kind, ({ data }) => {
+        if (this.leads) this.channel.postMessage({ kind, data, before: this.number() });
+        this.hear(kind, data);
+      });
+    source.onerror = this.lose;
+  }
+
+  // What the leader tells. A beat closes this tab's own stream: all that there is has come.
+  follow({ kind, data, before }) {
+    clearTimeout(this.silent);
+    if (this.number() < before) return this.ensure();
+    if (kind !== "events") this.source.close();
+    this.silent = setTimeout(() => this.ensure(), SILENT);
+    this.hear(kind, data);
+  }
+
+  ensure() {
+    if (this.source.readyState === EventSource.CLOSED) this.open();
+  }
+
+  close() {
+    this.is_closed = true;
+    clearTimeout(this.silent);
+    this.source.close();
+    this.channel?.close();
+    this.release?.();
+  }
+}
