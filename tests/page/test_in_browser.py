@@ -181,6 +181,21 @@ def test_what_happens_appears_and_the_page_follows(page: Page, begin: Begin) -> 
     assert "interrupted by SIGINT" in page.text("#why", "Stopped")
 
 
+def test_on_a_phone_the_tools_of_the_timeline_are_seen_whole(page: Page, begin: Begin) -> None:
+    run = begin(events := told_of()[:8])
+    run.write(events)
+    window = page.open("#pane=time", width=390)
+    page.text("#go-live", "Following live")
+    button = "document.getElementById('go-live')"
+    wide = f"const words = document.createRange(); words.selectNodeContents({button});"
+    wide += f"return {button}.clientWidth - words.getBoundingClientRect().width"
+    assert window.run(wide) >= 8
+    parts = "[...document.querySelectorAll('.legend > span')]"
+    rights = window.run(f"return {parts}.map((one) => one.getBoundingClientRect().right)")
+    assert len(rights) == 6
+    assert max(rights) <= 390
+
+
 def test_a_tick_that_lasts_is_told_with_its_leaf(page: Page, begin: Begin) -> None:
     events = told_of()[:7]
     at = events[-1].at
