@@ -29,6 +29,7 @@ from bt_actions.page.feed import known
 from bt_actions.story.failures import Failure
 from bt_actions.story.state import State
 from tests.page.conftest import Served
+from tests.page.test_panes import Story
 from tests.support import browser as chromium
 from tests.support.every_kind import RUN_ID, every_kind
 
@@ -176,6 +177,29 @@ def test_the_state_is_the_same_where_events_are_missing(
         dealt = [each for each in expected["dealt"] if each[0] in mine]
         assert dealt
         assert [each[:3] for each in one["dealt"]][-len(dealt) :] == [each[:3] for each in dealt]
+
+
+STORIES = """
+const run = new window.Store.Run("x"), events = JSON.parse(arguments[0]);
+run.take({ from: 1, to: events.at(-1).at[0], events });
+return import("/words.js").then(({ story }) => run.attempts.map((a) => story(a, run.nodes[a.n], run.clock)));
+"""  # noqa: E501
+
+
+def test_of_an_attempt_whose_end_is_not_recorded_that_is_said(
+    served: Served, window: chromium.Browser
+) -> None:
+    story, state = Story(), State()
+    story.begin(1.0, "1" * 32)
+    plain = [to_plain(each) for each in story.told]
+    story.end(2.0, "1" * 32)
+    story.begin(3.0, "2" * 32)
+    for each in story.told:
+        state.fold(each)
+    in_page(served, window, [*plain, known(state)], [0])
+    first, second = window.run(STORIES, json.dumps([*plain, known(state)]))
+    assert first.endswith(". How it ended is not recorded.")
+    assert "executing" in second
 
 
 def test_a_batch_that_does_not_follow_is_refused_and_one_that_overlaps_is_taken_once(
