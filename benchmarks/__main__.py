@@ -92,6 +92,8 @@ journal showed that each ran once and in its order.
 - Rows 17 to 19 are of the page of `bt-actions view` in headless Chromium: what its scripts take for
   a frame that paints; from an event in the run, through its recorder and the page's server, to the
   task behind the frame that shows the event; and from a press to the task behind the frame.
+- In row 20 `bt-actions view` tells a run, while it is recorded, to twenty readers and to one that
+  stopped reading, which are a process of their own. Not in CI: three processes on two cores.
 - `make bench-short`, which CI calls, measures rows 1 to 5, 8 and 14 to 19, and fails where one is
   beyond its limit by more than a quarter (row 15: by two fifths, beside a chain by hand twice; rows
   16 to 19: three times) in each of three tries.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import tempfile
 import threading
 import time
@@ -18,6 +19,7 @@ from test_msgs.action import Fibonacci
 from benchmarks import processes
 from benchmarks.chain import ACTION, GOALS, STOCK
 from benchmarks.harness import MANY, Family, Figures, Row
+from benchmarks.readers import READERS, readers
 from benchmarks.wire import Wire
 from bt_actions import ActionBehaviour, TreeRunner
 from bt_actions.events import Moment, Node, NodeChanged, RunBegan
@@ -27,6 +29,7 @@ from bt_actions.recording.recorder import Recorder, Wish
 from bt_actions.recording.writing import RunWriter
 
 LARGE = 100_000_000
+WATCHED = f"on {READERS} pages, and one that stopped reading"
 RATE, TICKS, CHANGES = 100.0, 500, 10
 """Ticks a second, ticks in all, and events in each."""
 
@@ -37,6 +40,23 @@ def _recorded(stream: Stream) -> Callable[[], None]:
     recorder.record(stream, lambda: None)
 
     def close() -> None:
+        recorder.close()
+        folder.cleanup()
+
+    return close
+
+
+def _watched(stream: Stream) -> Callable[[], None]:
+    """Record, and have the page tell it to readers of which one stops to read."""
+    folder = tempfile.TemporaryDirectory()
+    os.environ["XDG_STATE_HOME"] = folder.name
+    serving = readers(Path(folder.name))
+    serving.__enter__()
+    recorder = Recorder(Wish(), print)
+    recorder.record(stream, lambda: None)
+
+    def close() -> None:
+        serving.__exit__(None, None, None)
         recorder.close()
         folder.cleanup()
 
@@ -108,6 +128,7 @@ _READERS: dict[str, Callable[[Stream], Callable[[], None]]] = {
     "recorded": _recorded,
     "shown": _shown,
     "while 100 MB are finished": _finishes,
+    WATCHED: _watched,
 }
 
 
@@ -220,7 +241,19 @@ TICKED = Family(
             slack=3.0,
         )
         for name in _READERS
-        if name != "alone"
+        if name not in ("alone", WATCHED)
+    ]
+    + [
+        Row(
+            "20",
+            f"the p99 of a tick with 10 events, 100 a second, {WATCHED}",
+            "recorded",
+            (WATCHED, "p99"),
+            ("recorded", "p99"),
+            0.3,
+            is_difference=True,
+            slack=3.0,
+        )
     ],
     {name: lambda name=name: processes.side("recording", f"tick {name}") for name in _READERS},
     MANY,
