@@ -164,6 +164,15 @@ def test_a_card_shows_every_policy_as_it_is_in_effect(tree: Path) -> None:
     assert tables["Retry"]["when"] == "result.final_pose > 0.0"
 
 
+def test_the_default_of_a_secret_is_on_no_card(tmp_path: Path) -> None:
+    file = tmp_path / "t.yaml"
+    file.write_text(
+        "tree: t\ninputs: {pin: {type: int8, secret: true, default: 77}}\nroot: {log: $(pin)}\n"
+    )
+    (inputs,) = cards_of(load_tree(file))[0].tables
+    assert [line.value for line in inputs.lines] == ["int8, •••"]
+
+
 def test_a_tree_made_in_python_shows_what_there_is() -> None:
     def near(result: Any) -> bool:
         return bool(result)

@@ -19,6 +19,7 @@ from bt_actions.behaviours.kinds import action_of
 from bt_actions.behaviours.places import in_order
 from bt_actions.behaviours.variables import Var
 from bt_actions.document.written import document_of, node_of, own_text
+from bt_actions.events.snapshot import HIDDEN
 from bt_actions.goals.policy import Retry, Timeouts
 from bt_actions.messages import fields as ros_fields
 from bt_actions.messages.interfaces import PARTS, Kind, interface, interface_name, short_name
@@ -164,7 +165,8 @@ def _ports(document: Document) -> Iterator[Table]:
 
     inputs = []
     for name, one in inputs_of(document).items():
-        given = "required" if one.required else f"{_value(one.default)} {one.unit}".strip()
+        default = HIDDEN if one.secret else _value(one.default)
+        given = "required" if one.required else f"{default} {one.unit}".strip()
         inputs.append(Line(name, f"{one.type}, {given}"))
     if inputs:
         yield Table("Inputs", tuple(inputs))

@@ -150,7 +150,8 @@ class TreeTeller(Teller):
         by_itself, warning, due_in = False, "", None
         is_secret = self.reads_secret or bool(getattr(node, "reads_secret", False))
         hidden = self._hidden
-        from_below = hidden and any(hidden.get(child) == message for child in node.children)
+        below = hidden and [hidden[child] for child in node.children if child in hidden]
+        from_below = below and any(said in message for said in below)  # py_trees adds words to it
         if message and (is_secret or from_below):
             hidden[node], message = message, HIDDEN
         if self.has_news:
@@ -187,7 +188,7 @@ class TreeTeller(Teller):
                 name: HIDDEN if name in hidden else snapshot(each, fields=_ALL, size=_ALL)
                 for name, each in outputs.items()
             },
-            "" if error is None else where_raised(error),
+            "" if error is None else where_raised(error, hides=self.reads_secret),
             isinstance(error, UnusableTree),
             tuple(unaccounted),
             self.numbers.get(getattr(error, "culprit", None)),
@@ -199,11 +200,15 @@ def _is_over(node: object) -> bool:
     return not isinstance(node, ActionBehaviour) or (node.drained and not node.draining)
 
 
-def where_raised(error: BaseException) -> str:
-    """Return one line about the error that ended a run, with the place in the user's code."""
+def where_raised(error: BaseException, *, hides: bool = False) -> str:
+    """Return one line about the error that ended a run, with the place in the user's code.
+
+    `hides` leaves out the words of the user's code, which may hold a secret.
+    """
     cause = error.__cause__ or error
     frames = [] if isinstance(cause, TreeError) else traceback.extract_tb(cause.__traceback__)
-    return f"{error} ({frames[-1].filename}:{frames[-1].lineno})" if frames else str(error)
+    said = f"{type(cause).__name__}: {HIDDEN}" if hides else str(error)
+    return f"{said} ({frames[-1].filename}:{frames[-1].lineno})" if frames else said
 
 
 @lru_cache(maxsize=1)

@@ -9,6 +9,7 @@ from bt_actions_interfaces.msg import ActionReport, Finding, RunningLeaf, TreeIn
 from builtin_interfaces.msg import Duration
 from unique_identifier_msgs.msg import UUID
 
+from bt_actions.events.snapshot import HIDDEN
 from bt_actions.goals.policy import End
 from bt_actions.serving.catalog import ServedTree
 from bt_actions.serving.outcome import ENDS, OUTCOMES, SEPARATOR, RunOutcome
@@ -79,7 +80,9 @@ def info(entry: ServedTree, goals: Iterable[tuple[UUID, Run, bool]]) -> TreeInfo
                 unit=each.unit,
                 description=each.description,
                 required=each.required,
-                default_json="" if each.required else as_json(each.default),
+                default_json=""
+                if each.required
+                else as_json(HIDDEN if each.secret else each.default),
             )
             for each in ({} if tree is None else tree.inputs).values()
         ],

@@ -16,6 +16,7 @@ from robot_control_interfaces.action import Gripper as GripperAction
 from robot_control_interfaces.action import MoveRobot as Move
 
 from bt_actions import ActionBehaviour, MoveRobot, Retry, Timeouts, TreeError, load_tree
+from bt_actions.behaviours.variables import hide, unhide, value_of
 from bt_actions.events import (
     AttemptEnded,
     Event,
@@ -563,6 +564,10 @@ class TestSecretsInWords:
             "{check: $pin > 9999}",
             "{while: $pin > 9999, child: {success: S}}",
             "{set: {code: = $pin + 1}}",
+            "{force_success: C, child: {check: $pin > 9999}}",
+            "{force_failure: C, child: {log: $(pin)}}",
+            "{force_success: C, child: {force_failure: F, child: {log: $(pin)}}}",
+            "{force_success: C, child: {if: {check: $pin > 9999}, then: {success: a}}}",
         ],
     )
     def test_no_kind_of_node_tells_one(self, node: str, tmp_path: Any) -> None:
@@ -574,6 +579,20 @@ class TestSecretsInWords:
         runner.run()
         lines = [to_line(event) for event in runner.events if not isinstance(event, RunBegan)]
         assert not [line for line in lines if "7776" in line]
+
+    def test_the_words_of_an_exception_are_hidden_and_its_place_is_told(self) -> None:
+        def raise_it(_tick: int) -> None:
+            raise RuntimeError(f"bad {value_of('/pin')}")
+
+        Blackboard.set("/pin", "hunter2")
+        hide(["/pin"])
+        runner = VirtualRunner(Does("D", raise_it), VirtualNetwork())
+        with pytest.raises(TreeError, match="hunter2"):
+            runner.run()
+        unhide(["/pin"])
+        assert not [event for event in runner.events if "hunter2" in to_line(event)]
+        (finished,) = events_of(runner, TreeFinished)
+        assert re.fullmatch(r"RuntimeError: ••• \(.*test_telling.py:\d+\)", finished.error)
 
     def test_what_never_read_one_is_told(self, tmp_path: Any) -> None:
         text = (

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 
 from bt_actions_interfaces.msg import TreeInfo, TreeInput
 from bt_actions_interfaces.srv import ListTrees
 from rclpy.node import Node
 
 from bt_actions.cli.commands.list_trees import text_of, tree_data
+from bt_actions.document.load import open_tree
 from bt_actions.ros.serving.endpoints import Endpoints
+from bt_actions.serving.catalog import ServedTree
 from bt_actions.serving.client import trees_in_sight
+from bt_actions.serving.messages import info
+from bt_actions.utilities.plain_text import as_json
 from tests.serving.conftest import MAIN, Serve
 from tests.support.processes import Process
 
@@ -53,6 +58,15 @@ def test_what_a_server_says_cannot_command_the_terminal() -> None:
     text = "".join(text_of({"/s": [tree_data(tree)]}))
     assert "\x1b" not in text
     assert "\n" not in text
+
+
+def test_the_default_of_a_secret_is_not_listed(tmp_path: Path) -> None:
+    file = tmp_path / "t.yaml"
+    file.write_text(
+        "tree: t\ninputs: {pin: {type: string, secret: true, default: x}}\nroot: {log: $pin}\n"
+    )
+    (pin,) = info(ServedTree("t", file, open_tree(file), "", (), {}), ()).inputs
+    assert (pin.name, pin.default_json) == ("pin", as_json("•••"))
 
 
 def test_a_server_that_was_not_asked_at_first_is_asked_again(
