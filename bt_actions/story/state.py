@@ -278,7 +278,7 @@ class State:
             is_stopped = below.status in (Status.INVALID, Status.RUNNING)
             if below.is_leaf and is_stopped and below.number > story.ended:
                 found.append(below)
-        return found[:2]
+        return found
 
     def _settle(self, child: int, by: int) -> None:
         """Take failures at or below `child` as dealt with, as they did not make `by` fail."""

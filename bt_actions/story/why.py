@@ -26,6 +26,8 @@ LINES = 12
 """Lines of one story in a terminal."""
 ATTEMPTS = 3
 """Attempts of one failure with a line of their own: the last ones."""
+STOPPED = 2
+"""Leaves with a line of their own that one node has stopped."""
 BELOW = 5
 """Lines of a run below a RunTree leaf."""
 _BELOW = "has failed:"
@@ -60,21 +62,23 @@ def why(state: State, now: float | None = None) -> list[str]:
     if state.finished.error:
         stories = [list(_raised(state, state.finished))]
     elif state.status is Status.INVALID and state.stopped:
-        stories = [["stopped while it ran:"], *(list(_told(each, state)) for each in state.stopped)]
+        stories = [list(_told(each, state)) for each in state.stopped]
+        stories[0].insert(0, "stopped while it ran:")
     if not stories:
         return []
-    dealt = list(_dealt_with(state))
-    room = LINES - len(dealt)
+    told = f"{state.lost} events were lost to this reader: there may be more to it"
+    lost, dealt = [told] if state.lost else [], list(_dealt_with(state))
+    if len(stories[0]) + (len(stories) > 1) + len(lost) + len(dealt) > LINES:
+        dealt = []  # a long cause comes first
+    room = LINES - len(lost) - len(dealt)
     lines: list[str] = []
     for number, cause in enumerate(stories):
-        if lines and len(lines) + len(cause) > room:
-            more = [each[0].strip().rpartition(" / ")[2] for each in stories[number:]]
-            lines.append(f"and {len(more)} more: {', '.join(more)}")
+        names = [each[0].strip().rpartition(" / ")[2] for each in stories[number:]]
+        if lines and len(lines) + len(cause) + (len(names) > 1) > room:
+            lines.append(f"and {len(names)} more: {', '.join(names)}")
             break
         lines += cause
-    if state.lost:
-        lines.append(f"{state.lost} events were lost to this reader: there may be more to it")
-    return [fit(line) for line in lines + dealt]
+    return [fit(line) for line in lines + lost + dealt]
 
 
 def why_text(state: State, now: float | None = None) -> str:
@@ -110,11 +114,13 @@ def _told(failure: Failure, state: State) -> Iterator[str]:
         yield clean(f"  {did_text(failure)}")
     if failure.ran is None or failure.attempts:
         yield from _attempts(failure)
-    for each in failure.below:
+    for each in failure.below[:STOPPED]:
         said = each.message
         if each.action is not None and each.attempts:
             said = attempt_text(each.action, each.attempts[-1])
         yield clean(f"  it stopped {state.called(each.node.id)}{f': {said}' if said else ''}")
+    if (more := len(failure.below) - STOPPED) > 0:
+        yield f"  and {more} more"
     failed = state.status is Status.FAILURE
     holders = failure.holders if failed else ()
     passed = ", ".join(f"{above.name} ({above.kind})" for above in holders)

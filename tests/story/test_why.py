@@ -302,6 +302,77 @@ def test_of_two_leaves_of_one_name_that_were_stopped_the_path_tells_which() -> N
     assert sorted(stopped) == ["  it stopped Left / Wait", "  it stopped Right / Wait"]
 
 
+def test_of_many_leaves_that_a_node_has_stopped_the_rest_is_counted() -> None:
+    leaves = [FakeNode(f"Wait {number}", kind="wait") for number in range(30)]
+    root = FakeNode("In time", [FakeNode("All", leaves, "parallel")], "timeout", place="x.yaml:3:5")
+    story = Story(root)
+    state = story.told(
+        *(story.node(each, Status.RUNNING) for each in (*leaves, root)),
+        *(story.node(each, Status.INVALID) for each in leaves),
+        story.node(root, Status.FAILURE, "its time is over", by_itself=True),
+        story.finish(Status.FAILURE),
+    )
+    assert lines(state) == [
+        "In time",
+        "  failed: its time is over",
+        "  it stopped Wait 29",
+        "  it stopped Wait 28",
+        "  and 28 more",
+        "  x.yaml:3:5",
+    ]
+
+
+@pytest.mark.parametrize("dealt", [0, 1, 2])
+@pytest.mark.parametrize("causes", range(1, 7))
+@pytest.mark.parametrize("lost", [0, 5])
+def test_a_failure_has_at_most_twelve_lines_and_counts_each_cause(
+    causes: int, lost: int, dealt: int
+) -> None:
+    before = [FakeNode(f"Before {number}") for number in range(dealt)]
+    tried = [FakeNode(f"Tried {number}", [leaf], "fallback") for number, leaf in enumerate(before)]
+    leaves = [FakeNode(f"Check {number}") for number in range(causes)]
+    either = FakeNode("Either", leaves, "fallback")
+    story = Story(FakeNode("Main", [*tried, either]))
+    events: list[Event] = []
+    for leaf, holder in zip(before, tried, strict=True):
+        events += [story.node(leaf, Status.FAILURE, "no"), story.node(holder, Status.SUCCESS)]
+    events += [story.node(each, Status.FAILURE, "no") for each in (*leaves, either, story.root)]
+    state = story.told(*events, story.finish(Status.FAILURE))
+    state.lost = lost
+    said = lines(state)
+    assert len(said) <= 12, said
+    assert any("lost" in line for line in said) is bool(lost)
+    assert sum("went on" in line for line in said) == dealt
+    told = sum(line.startswith("Main / Either / Check") for line in said)
+    rest = sum(int(line.split()[1]) for line in said if line.startswith("and "))
+    assert told + rest == causes
+    # one more cause has three lines instead of "and 1 more", or beside "and 2 more"
+    assert not rest or len(said) + (2 if rest == 1 else 3) > 12
+
+
+def test_a_long_cause_comes_before_failures_that_were_dealt_with() -> None:
+    before = [FakeNode(f"Before {number}") for number in range(2)]
+    tried = [FakeNode(f"Tried {each.name}", [each], "fallback") for each in before]
+    run = FakeAction("Run it", "/r1/run_tree")
+    run.action = "RunTree"
+    other = FakeNode("Other")
+    story = Story(FakeNode("Main", [*tried, FakeNode("Either", [run, other], "fallback")]))
+    either = story.root.children[-1]
+    events: list[Event] = []
+    for leaf, holder in zip(before, tried, strict=True):
+        events += [story.node(leaf, Status.FAILURE, "no"), story.node(holder, Status.SUCCESS)]
+    aborted = {"outcome": Outcome.ABORTED, "end": End.ABORTED}
+    below = {"error_msg": "\n".join(f"line {number}" for number in range(9))}
+    events += [story.goal(run, "EXECUTING"), story.goal(run, "DONE", **aborted, result=below)]
+    events += [story.node(each, Status.FAILURE) for each in (run, other, either, story.root)]
+    state = story.told(*events, story.finish(Status.FAILURE))
+    state.lost = 5
+    said = lines(state)
+    assert (len(said), said[0]) == (12, "Main / Either / Run it"), said
+    assert not any("dealt with" in line for line in said)
+    assert any(line.startswith("5 events were lost") for line in said)
+
+
 def test_what_a_behaviour_raised_tells_where_in_which_item_and_what() -> None:
     camera = FakeNode("Camera", kind="python", place="x.yaml:5:3")
     each = FakeNode("Each", [camera], "for_each")
