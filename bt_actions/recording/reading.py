@@ -6,7 +6,7 @@ are passed over and counted; names without end are an error.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import BinaryIO, TypeAlias
@@ -55,6 +55,8 @@ from bt_actions.story.state import State
 
 MOST_NAMES = 1_000_000
 """Nodes, variables, servers and goals of one run that are read."""
+DEEPEST = 500
+"""Nodes from the root down to any node; a tree file has 200 at most."""
 LAST = 2**53 - 1
 """The highest number of an event, which JSON holds in every language, and no run reaches."""
 MOST_BYTES = 100_000_000
@@ -97,8 +99,10 @@ class Recording:
         self._base: int | None = None
         """Nanoseconds by which the log's time is ahead of the steady clock."""
         self._names: set[str] = set()
-        self._nodes = self._node = 0
-        """The number of nodes, and the highest number of one."""
+        self._nodes = 0
+        """The number of nodes that were added."""
+        self._depths: dict[int, int] = {}
+        """How deep each node lies, the highest number last."""
         self._attachments = 0
         """Bytes of the attachments."""
         self.begin_part()
@@ -195,11 +199,10 @@ class Recording:
             return
         if isinstance(event, EventsLost):  # it has the number of the event behind it
             self._number = self._before
+        if isinstance(event, NodesAdded):
+            self._number_nodes(event.nodes, self._depths)
         if isinstance(event, RunBegan):
-            self._node = 0
-        if isinstance(event, RunBegan | NodesAdded):
-            self._number_nodes(event.nodes)
-        if isinstance(event, RunBegan):
+            self._number_nodes(event.nodes, {})
             self._run_id = event.run_id if event.run_id == run_id else ""
             event = replace(event, sources=dict(self.sources))
         yield event
@@ -220,15 +223,21 @@ class Recording:
         self._number = number
         return True
 
-    def _number_nodes(self, nodes: tuple[Node, ...]) -> None:
-        """Refuse nodes that are no tree: numbers grow, and parents come before their children."""
+    def _number_nodes(self, nodes: Iterable[Node], depths: dict[int, int]) -> None:
+        """Refuse nodes that are no tree beside those of `depths`, or are too deep in it.
+
+        Numbers grow, and parents come before their children.
+        """
         for node in nodes:
-            is_above = self._node < node.id and (node.parent or 0) < node.id
+            is_above = next(reversed(depths), 0) < node.id and (node.parent or 0) < node.id
             if not is_above or not 0 <= (node.index or 0) < node.id:
                 raise WireError("no tree")
-            self._node = node.id
-        if not self._node:
+            depths[node.id] = depths.get(node.parent or 0, 0) + 1
+            if depths[node.id] > DEEPEST:
+                raise WireError("the tree is too deep")
+        if not depths:
             raise WireError("a tree has nodes")
+        self._depths = depths
 
     def _transition(self, message: Message, head: tuple[object, ...]) -> Iterator[Item]:
         number, seconds, rest, node, status, by_itself = head
@@ -249,7 +258,8 @@ class Recording:
         self._base = log_time - nanoseconds(state.now.steady)
         if not self._goes_on(state.now.number):
             return
-        lost, self._node = self._number - self._before, max(state.nodes)
+        self._number_nodes((state.nodes[each].node for each in sorted(state.nodes)), {})
+        lost = self._number - self._before
         self._run_id = state.began.run_id if state.began is not None else ""
         yield EventsLost(state.now, lost)
         yield state

@@ -6,6 +6,7 @@ and statuses within a tick, have none.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -79,6 +80,8 @@ class Timeline:
         self.lost = 0
         """Events that are missing in the recording."""
         self._names: dict[tuple[str, ...], str] = {}
+        self._alike: defaultdict[str, list[int]]
+        """The nodes by name: a path is made only of those that share one."""
 
     def __iter__(self) -> Iterator[Line]:
         """Read the recording. Raises RecordingError."""
@@ -108,9 +111,12 @@ class Timeline:
 
     def _called(self, path: tuple[str, ...]) -> str:
         """Return a node's name, behind the part of its path that tells it apart from others."""
-        if path not in self._names:
-            state = self.state
-            self._names = told_apart([state.path(each) for each in state.nodes])
+        if path and path not in self._names:
+            if not self._names:
+                self._alike = defaultdict(list)
+                for number, story in self.state.nodes.items():
+                    self._alike[story.node.name].append(number)
+            self._names |= told_apart(map(self.state.path, self._alike[path[-1]]))
         return self._names.get(path, "")
 
     def _words(self, event: Event, was: Status) -> tuple[str, str]:

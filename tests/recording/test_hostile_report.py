@@ -18,7 +18,7 @@ from mcap.writer import Writer
 from bt_actions import MoveRobot
 from bt_actions.cli import main
 from bt_actions.cli.commands.report import data
-from bt_actions.events import GoalChanged, to_line
+from bt_actions.events import GoalChanged, Node, NodesAdded, to_line
 from bt_actions.recording import reading
 from bt_actions.recording.folders import summary_of
 from bt_actions.recording.layout import CHANNELS, EVENTS, LAYOUTS, STATE, encode
@@ -27,6 +27,7 @@ from bt_actions.recording.report import markdown, reports, text
 from bt_actions.recording.statistics import Statistics
 from bt_actions.recording.tape import Tape
 from bt_actions.story.keeping import to_json
+from bt_actions.story.state import State
 from bt_actions.testing import VirtualNetwork, serve_as_recorded
 from bt_actions.utilities.plain_text import as_json
 from tests.support.every_kind import every_kind
@@ -198,6 +199,42 @@ def test_nodes_that_are_no_tree_are_no_run(tmp_path: Path, nodes: list[list[int 
     began["nodes"] = [node | {"id": own, "parent": parent} for own, parent in nodes]
     path = raw(tmp_path / "run.mcap", map(json.dumps, [server, began, *rest]))
     assert "holds no run" in whole(path)
+
+
+def test_a_tree_that_is_too_deep_is_no_run_and_no_path_of_the_others_is_made_without_need(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server, began, *rest = (json.loads(to_line(event)) for event in every_kind())
+    node, made, path = began["nodes"][0], list[int](), State.path
+
+    def chain(depth: int) -> str:
+        own = ({"id": each, "parent": each - 1 or None} for each in range(1, depth + 1))
+        began["nodes"] = [node | each | {"name": f"n{each['id']}"} for each in own]
+        return whole(raw(tmp_path / "run.mcap", map(json.dumps, [server, began, *rest])))
+
+    monkeypatch.setattr(State, "path", lambda state, of: made.append(of) or path(state, of))
+    assert chain(reading.DEEPEST).startswith("all: ")
+    assert 0 < len(made) < 100
+    assert "holds no run" in chain(reading.DEEPEST + 1)
+
+
+def test_nodes_and_a_state_that_lie_too_deep_are_passed_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    events = every_kind()
+    added = next(number for number, each in enumerate(events) if isinstance(each, NodesAdded))
+    state, texts = state_of(events[: added + 1]), list(map(to_line, events))
+    deepest = max(len(state.path(node)) for node in state.nodes)
+    for bound in (deepest, deepest - 1):
+        monkeypatch.setattr(reading, "DEEPEST", bound)
+        from_state = Recording(raw(tmp_path / "a.mcap", texts[added + 1 :], to_json(state)))
+        assert any(isinstance(each, State) for each in from_state.items()) == (bound == deepest)
+    deeper = replace(events[added], nodes=(Node(4, 3, "New", "wait"), Node(5, 4, "New", "wait")))
+    texts[added] = to_line(deeper)
+    for bound in (len(state.path(3)) + 2, len(state.path(3)) + 1):
+        monkeypatch.setattr(reading, "DEEPEST", bound)
+        found = list(Recording(raw(tmp_path / "b.mcap", texts)).items())
+        assert (deeper in found) == (bound > len(state.path(3)) + 1)
 
 
 def test_a_run_of_another_version_is_said_to_be_one(tmp_path: Path) -> None:
