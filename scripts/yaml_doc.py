@@ -196,7 +196,8 @@ the sent goal (`now` apart):
 | | |
 |---|---|
 | `ignore` | nothing is done |
-| `replace` | the new goal is sent at once; the old one is canceled after `timeout.cancel` |
+| `replace` | the new goal is sent at once; the old one is canceled after `timeout.cancel`, \
+or when the node ends |
 | `cancel` | the goal is canceled, and the new one is sent after its end |
 
 The node stays RUNNING, and the end of the newest goal alone counts. `timeout.result` runs on, and

@@ -81,7 +81,7 @@ class Following:
         return newest
 
     def _let_go_of_older(self, newest: GoalHandle, backend: Backend) -> None:
-        """Interrupt a goal that the newest one was to replace, and has not."""
+        """Interrupt a goal that the newest one was to replace, and that still executes."""
         for handle in self.open_handles():
-            if handle is not newest and handle.goal.state is State.EXECUTING:
+            if handle is not newest and handle.goal.state in (State.EXECUTING, State.REPLACED):
                 backend.traffic.interrupt(handle)

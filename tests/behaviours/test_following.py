@@ -234,3 +234,19 @@ def test_what_is_stopped_while_it_replaces_leaves_neither_goal_while_the_tree_go
         assert journal.ends()[0] == "canceled", "though the newer one is not accepted yet"
         runner.advance(5.0)
         assert journal.ends() == ["canceled", "canceled"]
+
+
+@pytest.mark.parametrize("is_stopped", [True, False], ids=["stopped", "succeeded"])
+def test_a_goal_that_was_replaced_does_not_outlive_its_leaf(world: World, is_stopped: bool) -> None:
+    root, guard, wanted, journal = in_a_tree(world)
+    later = Sequence("later", memory=True, children=[root, Gate()])
+    with world.runner(later) as runner:
+        runner.start()
+        runner.advance(1.0)
+        wanted[0] = 3.0 if is_stopped else 0.5
+        runner.advance(0.4)
+        assert journal.max_live == 2
+        guard.holds = not is_stopped
+        runner.advance(0.6)
+        assert later.status is Status.RUNNING
+        assert journal.ends() == ["canceled", "canceled" if is_stopped else "succeeded"]
