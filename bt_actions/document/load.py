@@ -6,7 +6,7 @@ import contextlib
 import gc
 import os
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial, wraps
 from pathlib import Path
@@ -274,13 +274,30 @@ def check_source(source: Source, *, types: bool = True, python: bool = True) -> 
 
 def _checked(workspace: Workspace, *, types: bool, python: Python = True) -> list[Finding]:
     # Libraries first: what is wrong with them by themselves is not told of the trees they are in.
+    used = _used(workspace.documents)
     for document in sorted(workspace.documents, key=lambda one: one.root is not None):
         with contextlib.suppress(TooManyErrors):  # errors of this document, which is refused
-            checker = Checker(document, types=types, python=python)
+            asked = used if document.root is None else None
+            checker = Checker(document, types=types, python=python, used=asked)
             check_document(checker)
             find_hazards(checker)
             apply_ignores(document.source, partial(_all_tried, document, checker.doubts))
     return workspace.findings
+
+
+def _used(documents: Sequence[Document]) -> set[int] | None:
+    """Return the ids of the nodes that declare the actions of trees; None where there is no tree.
+
+    Nav2's older releases lack types of nav2.yaml: a tree without these actions needs none of them.
+    """
+    trees = [document for document in documents if document.root is not None]
+    actions = (
+        tree.actions[alias]
+        for tree in trees
+        for node in tree.nodes()
+        if (alias := node.alias) is not None
+    )
+    return {id(action.node) for action in actions} if trees else None
 
 
 def _all_tried(document: Document, doubts: Doubts) -> bool:

@@ -73,6 +73,17 @@ def test_nothing_is_said_of_an_imported_action_that_no_node_uses(tmp_path: Path)
     assert found(tmp_path, library) == []
 
 
+def test_a_type_that_is_not_installed_is_told_where_a_node_needs_it(tmp_path: Path) -> None:
+    other = MOVE.format("").replace("MoveRobot", "Fly")
+    library = f"actions:\n  move: {MOVE.format('')}\n  other: {other}\n"
+    assert found(tmp_path, library) == []
+    assert [(one.line, one.code) for one in check_file(tmp_path / "lib.yaml")] == [(3, "BT205")]
+    missing = (
+        "BT205 package 'robot_control_interfaces' has no action 'Fly'; it has Gripper, MoveRobot"
+    )
+    assert found(tmp_path, library.replace("MoveRobot", "Fly")) == [f"lib.yaml:2 {missing}"]
+
+
 def test_nothing_is_said_of_settings_in_whose_place_each_node_has_its_own(tmp_path: Path) -> None:
     settings = "goal: {distance: $elsewhere}, expect: $least > 1, retry: {when: $most}"
     own = "goal: {distance: 1.0}, expect: true, retry: {when: true}"

@@ -117,8 +117,18 @@ def _noted(*_key: object) -> list[tuple[FieldType | None, list[Wrong]]]:
 class Checker:
     """The knowledge about one document; each included tree has a checker of its own."""
 
-    def __init__(self, document: Document, *, types: bool, python: Python = True) -> None:
-        """Check a document; a ``python:`` node outside of `python` is an error, never imported."""
+    def __init__(
+        self,
+        document: Document,
+        *,
+        types: bool,
+        python: Python = True,
+        used: Container[int] | None = None,
+    ) -> None:
+        """Check a document; a ``python:`` node outside of `python` is an error, never imported.
+
+        Of a library that trees import, `used` are the ids of the nodes that declare their actions.
+        """
         self.document = document
         self.source = document.source
         self.doubts = Doubts(document)
@@ -135,6 +145,7 @@ class Checker:
         self._items: dict[int, dict[str, Write]] = {}
         self._interfaces: dict[str, type | None] = {}
         self._classes: dict[str, type | None] = {}
+        self._used = used
 
     def interface(
         self, name: str, kind: str, node: Node, source: Source | None = None
@@ -186,7 +197,8 @@ class Checker:
         if name not in self._classes:
             text, at = declared.values.get("type"), declared.written("type")
             self._classes[name] = None
-            if isinstance(text, str):
+            is_used = self._used is None or id(declared.node) in self._used
+            if isinstance(text, str) and is_used:
                 self._classes[name] = self.interface(text, "action", at, declared.source)
         return self._classes[name]
 
