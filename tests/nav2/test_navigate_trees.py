@@ -281,7 +281,7 @@ def test_their_messages_were_built_for_running_and_for_building_upon(
     nav2_msgs: dict[str, str],
 ) -> None:
     prefix = Path(nav2_msgs["AMENT_PREFIX_PATH"])
-    assert len(list(prefix.glob("share/nav2_msgs/action/*.action"))) == 15
+    assert len(list(prefix.glob("share/nav2_msgs/action/*.action"))) == 14
     for wanted in (
         "nav2_msgs/action/__init__.py",
         "include/nav2_msgs/**/spin.hpp",
