@@ -394,8 +394,8 @@ def test_imports_bring_actions_topics_and_defaults_and_the_own_ones_win(load: Lo
 @pytest.mark.parametrize(
     ("library", "finding"),
     [
-        ("actions: {m: {type: foo/action/Bar, server: m, timeout: 1 s}}",
-         ("robot.yaml", 1, 21, "BT205")),
+        ("kinds: {m: {python: py_trees.behaviours.Success, inputs: {a: foo/msg/Bar}}}",
+         ("robot.yaml", 1, 9, "BT205")),
         ("topics: {a: {topic: a, type: foo/msg/Bar}}", ("robot.yaml", 1, 30, "BT205")),
         ("topics: {here: {topic: a, type: std_msgs/msg/Bool}}", ("main.yaml", 3, 10, "BT216")),
         ("inputs: {a: int32}\nactions: {}", ("robot.yaml", 1, 1, "BT107")),

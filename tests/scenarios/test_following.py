@@ -219,7 +219,7 @@ def publishing(node: Any, topic: str) -> Iterator[Callable[[float], None]]:
         for step in itertools.count():
             if over.wait(PERIOD):
                 return
-            publisher.publish(Float64(data=told[-1] if told else LONG + step / 10.0))
+            publisher.publish(Float64(data=told[-1] if told else LONG + step % 100 / 10.0))
 
     thread = threading.Thread(target=publish)
     thread.start()

@@ -29,7 +29,7 @@ _KINDS = _table(
         "here it is 'parallel'": "parallelall parallelnode concurrent all join gather",
         "here it is 'while'": "eternalguard",
         "here it is 'if'": "ifthenelse whiledoelse",
-        "'then' and 'else' stand beside an 'if'": "then else",
+        "it is a key of 'if'": "then else",
         "here it is 'invert'": "inverter not negate",
         "here it is 'retry'": "retryuntilsuccessful retryuntilsuccesful failureisrunning",
         "here it is 'repeat'": "keeprunninguntilfailure successisrunning",
