@@ -18,6 +18,8 @@ from bt_actions.traffic.state import waker
 
 LOOKS = 0.05
 """Seconds between two looks for a listener or a service, whose coming nothing announces."""
+READ = "topics_read"
+"""The attribute of a behaviour with the names of the topics that its values come from."""
 KEPT = 100
 """Messages kept for a leaf that waits for one of them; older messages are dropped."""
 
@@ -28,7 +30,7 @@ class TopicValue(Connected[Subscription]):
     def __init__(
         self, name: str, message_type: type | str, topic: str, qos: str, max_age: float | None
     ) -> None:
-        self.name = name
+        self.name, self.topic = name, topic
         self._given = message_type, topic, qos
         self._max_age = max_age
         self.default: Callable[[], object] | None = None
@@ -137,6 +139,7 @@ class WaitForMessage(Connected[Subscription], Limited):
     ) -> None:
         super().__init__(name)
         self._given = message_type, topic, qos
+        self.topic_name = topic
         self._timeout = timeout
         self._read = read
         self._kept: deque[Any] = deque(maxlen=0)  # unread ones, while it waits

@@ -72,6 +72,9 @@ def test_a_night_fails_again_as_it_did(start: Start, tmp_path: Path) -> None:
     assert runs[1].simulation == f"--sim-like {runs[0].began.run_id} --speed 10"
     assert any("13 of 13 of /gripper_control, 12 of 12 of" in line for line in again.lines), again
     assert any("feedback is played as it was recorded" in line for line in again.errors), again
+    assert sum("no recorded messages on /battery_state" in line for line in again.errors) == 1, (
+        again
+    )
 
     network = VirtualNetwork()
     tree = load_tree(NIGHT)

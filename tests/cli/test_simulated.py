@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bt_actions import load_tree
-from bt_actions.cli.driving.simulated import remark, wanted
+from bt_actions.cli.driving.simulated import Wanted, remark, wanted
 
 FOREIGN = """\
 tree: t
@@ -19,6 +19,21 @@ root:
   children:
     - {arm: A, goal: {distance: 1.0}}
     - {move: M, goal: {distance: 1.0}}
+    - {service: L, type: std_srvs/srv/SetBool, server: light}
+"""
+
+LISTENING = """\
+tree: t
+topics:
+  battery: {topic: battery_state, type: sensor_msgs/msg/BatteryState, qos: sensor}
+  level: {topic: level, type: std_msgs/msg/Float64}
+  unread: {topic: unread, type: std_msgs/msg/Float64}
+root:
+  sequence: S
+  children:
+    - check: $battery.percentage > 0.2
+    - {wait_for_message: D, topic: /door, type: std_msgs/msg/Bool, timeout: 3 s}
+    - {wait_until: $level.data > 0.0, timeout: 3 s}
     - {service: L, type: std_srvs/srv/SetBool, server: light}
 """
 
@@ -47,3 +62,15 @@ def test_servers_that_no_robot_has_are_named(tmp_path: Path) -> None:
     assert remark(found).endswith(
         "it has no server for /cell/arm (MoveRobot), /cell/light (SetBool)"
     )
+
+
+def test_the_topics_that_a_tree_reads_are_named_beside_a_recorded_run(tmp_path: Path) -> None:
+    path = tmp_path / "t.yaml"
+    path.write_text(LISTENING)
+    found = wanted(load_tree(path), "/cell")
+    assert found.topics == ("/cell/battery_state", "/door", "/cell/level")
+    assert remark(found, recorded=True) == (
+        "--sim-like serves actions; it has no server for /cell/light (SetBool), and it plays no "
+        "recorded messages on /cell/battery_state, /door, /cell/level (a robot's battery is full)"
+    )
+    assert remark(Wanted(("/",), ()), recorded=True) == ""

@@ -29,20 +29,29 @@ class Wanted:
     """The servers that no simulated robot has, as `name (type)`: of actions and of services."""
     services: Sequence[str] = ()
     """The servers of services among these."""
+    topics: Sequence[str] = ()
+    """The topics that the tree reads."""
 
 
 def wanted(root: Behaviour, namespace: str = "") -> Wanted:
     """Return the needs of `root` on a node in `namespace` ("" or with a slash)."""
     from bt_actions.behaviours.places import in_order
+    from bt_actions.behaviours.topics import READ, WaitForMessage
+
+    def expanded(name: str) -> str:
+        return name if name.startswith("/") else f"{namespace}/{name}"
 
     namespaces: dict[str, None] = {}
+    topics: dict[str, None] = {}
     others: dict[str, str] = {}
     for node in in_order(root):
+        heard = (node.topic_name,) if isinstance(node, WaitForMessage) else ()
+        topics |= dict.fromkeys(map(expanded, (*heard, *getattr(node, READ, ()))))
         for sort in ("action", "service"):
             name, kind = getattr(node, f"{sort}_name", None), getattr(node, f"{sort}_type", None)
             if not isinstance(name, str) or kind is None:
                 continue
-            full = name if name.startswith("/") else f"{namespace}/{name}"
+            full = expanded(name)
             above, _, last = full.rpartition("/")
             package, *_, word = (kind if isinstance(kind, str) else interface_name(kind)).split("/")
             if package == _PACKAGE and SERVED.get(word) == last:
@@ -50,17 +59,23 @@ def wanted(root: Behaviour, namespace: str = "") -> Wanted:
             else:
                 others[f"{full} ({word})"] = sort
     services = tuple(each for each, sort in others.items() if sort == "service")
-    return Wanted(tuple(namespaces) or (namespace or "/",), tuple(others), services)
+    robots = tuple(namespaces) or (namespace or "/",)
+    return Wanted(robots, tuple(others), services, tuple(topics))
 
 
 def remark(found: Wanted, *, recorded: bool = False) -> str:
     """Say in one line which servers must come from elsewhere; "" for none.
 
-    `recorded`: the actions are served as in a recorded run.
+    `recorded`: the actions are served as in a recorded run, which has no messages of topics.
     """
     if recorded:
-        names = ", ".join(found.services)
-        return f"--sim-like serves actions; it has no server for {names}" if names else ""
+        said = []
+        if found.services:
+            said.append(f"it has no server for {', '.join(found.services)}")
+        if found.topics:
+            topics = ", ".join(found.topics)
+            said.append(f"it plays no recorded messages on {topics} (a robot's battery is full)")
+        return f"--sim-like serves actions; {', and '.join(said)}" if said else ""
     if not found.others:
         return ""
     names = " and ".join(SERVED.values())

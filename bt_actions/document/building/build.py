@@ -12,7 +12,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 
 from bt_actions.behaviours.gates import gate
-from bt_actions.behaviours.topics import TopicValue, patient
+from bt_actions.behaviours.topics import READ, TopicValue, patient
 from bt_actions.document.building.context import Context, Scope, filled
 from bt_actions.document.findings import NODE
 from bt_actions.document.language.classes import Python
@@ -102,12 +102,19 @@ def _node(node: TreeNode, context: Context) -> Behaviour:
         gate(behaviour, {key: context.said(each) for key, each in gates.items()}, **conditions)
     if context.topics:
         written = settings_of(node, context.document) if node.is_action else node.values
+        if read := _read(written, context):
+            setattr(behaviour, READ, tuple(topic.topic for topic in read))
         if node.kind.only_asks and node.kind.slow:  # a slow check waits anyway
-            written = gates
-        names = {name for each in computed_in(written) for name in each.expression.variables}
-        if read := [topic for name, topic in context.topics.items() if name in names]:
+            read = _read(gates, context)
+        if read:
             patient(behaviour, read)
     setattr(behaviour, NODE, node)
     if context.once:
         node.release()
     return behaviour
+
+
+def _read(written: Mapping[str, object], context: Context) -> list[TopicValue]:
+    """Return the topics whose values the settings of a node compute with."""
+    names = {name for each in computed_in(written) for name in each.expression.variables}
+    return [topic for name, topic in context.topics.items() if name in names]
