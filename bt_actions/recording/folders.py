@@ -217,13 +217,11 @@ def find(text: str = "", where: Path | None = None) -> Path:
     text. Raises NoRun.
     """
     path = Path(text).expanduser()
-    if text and ("/" in text or path.suffix == ".mcap" or path.is_file()):
-        first = path / FIRST if path.is_dir() else path
-        if first.is_file():
-            return first
-        bags = sorted(path.glob("*.mcap")) if path.is_dir() else []
-        if bags:
-            return bags[0]
+    if text:
+        found = [path / FIRST, *sorted(path.glob("*.mcap"))] if path.is_dir() else [path]
+        if files := [each for each in found if each.is_file()]:
+            return files[0]
+    if "/" in text or path.suffix == ".mcap":
         raise NoRun(f"{text} is no recording: a folder with {FIRST}, or an .mcap file, is one")
     runs = recorded(where)
     if not runs:

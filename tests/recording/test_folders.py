@@ -234,6 +234,18 @@ class TestFind:
         (tmp_path / "README.md").touch()
         assert find("README.md", tmp_path) == Path("README.md")
 
+    def test_a_folder_that_lies_here_is_meant_where_it_holds_a_recording(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        bag, patrol = Path("my_bag"), Path("patrol")
+        for each in (bag, patrol):
+            each.mkdir()
+        (bag / "bag_0.mcap").touch()
+        assert find("my_bag", tmp_path) == bag / "bag_0.mcap"
+        newest = made(tmp_path, 1, tree="patrol")
+        assert find("patrol", tmp_path) == newest
+
     def test_what_there_is_not_is_said_with_what_is_near(self, tmp_path: Path) -> None:
         with pytest.raises(NoRun, match="no run is recorded yet"):
             find("", tmp_path)
