@@ -93,6 +93,7 @@ def test_bash_completes_runs_by_id_and_by_tree() -> None:
     assert sorted(bash_completes("report ")) == ["aaaaaaaa", "bbbbbbbb", "deliver"]
     assert bash_completes("report b") == ["bbbbbbbb"]
     assert sorted(bash_completes("watch ")) == ["aaaaaaaa", "bbbbbbbb", "deliver"]
+    assert bash_completes("runs --tree ") == bash_completes("stats --tree ") == ["deliver"]
 
 
 @pytest.mark.parametrize("line", ["", "run ", "run pick_and_place --set ", "explain ", "report "])

@@ -85,6 +85,12 @@ def _runs(prefix: str, **_others: object) -> dict[str, str]:
     return ids | dict.fromkeys(ids.values(), "its last run") | files
 
 
+def _recorded_trees(**_others: object) -> Iterable[str]:
+    from bt_actions.recording.folders import recorded
+
+    return {each.summary.tree for each in recorded()}
+
+
 _VALUES = {
     "TREE": _trees,
     "NAME=VALUE": _inputs,
@@ -92,5 +98,7 @@ _VALUES = {
     "SPEC": _faults,
     "RUN": _runs,
     "watch NAME": _runs,
+    "runs NAME": _recorded_trees,
+    "stats NAME": _recorded_trees,
 }
 """The answers, by the words that stand for values in help, of all commands or of one."""
