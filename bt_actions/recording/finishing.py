@@ -38,7 +38,8 @@ AT_ONCE = 1_000_000
 _FOOTER = 2
 _END = 9 + 20 + len(MAGIC)
 """Bytes of the footer and the magic behind it."""
-_CHUNK = 256_000
+_CHUNK = 16_000
+"""Bytes that are packed as one: what a damaged byte costs."""
 _NICE = 10
 
 

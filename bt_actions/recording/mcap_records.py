@@ -72,6 +72,8 @@ class Damage(NamedTuple):
     """A part of the file that was passed over."""
 
     why: str
+    size: int
+    """Its bytes."""
 
 
 Record = Message | Schema | Channel | Attachment | Damage
@@ -144,7 +146,7 @@ def _opened(kind: int, payload: bytes) -> Iterator[Record]:
             (size,) = struct.unpack_from("<Q", payload, at)
             yield Attachment(name, media, log, payload[at + 8 : at + 8 + size])
     except (struct.error, ValueError, RuntimeError, zstandard.ZstdError) as error:
-        yield Damage(str(error))
+        yield Damage(str(error), _HEAD.size + len(payload))
 
 
 def _text(payload: bytes, at: int) -> tuple[str, int]:
@@ -196,13 +198,13 @@ def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes] | Damage]:
 
     The length of a record is believed unless another record begins before it ends.
     """
-    rest, at, is_end, is_lost = b"", 0, False, False
+    rest, at, is_end, lost = b"", 0, False, 0
     while True:
         while len(rest) - at < _HEAD.size and not is_end:
             rest, at, is_end = _more(file, rest, at, _WINDOW)
         if len(rest) - at < _HEAD.size:
-            if is_lost or rest[at:] not in (b"", MAGIC):
-                yield Damage("a record is cut, or its length is damaged")
+            if lost or rest[at:] not in (b"", MAGIC):
+                yield Damage("a record is cut, or its length is damaged", lost + len(rest) - at)
             return
         kind, length = _HEAD.unpack_from(rest, at)
         end = at + _HEAD.size + length
@@ -214,18 +216,19 @@ def _framed(file: BinaryIO) -> Iterator[tuple[int, bytes] | Damage]:
         is_whole = is_likely and len(rest) >= end
         next_one = end if is_whole and _follows(rest, end) else _found(rest, at + 1)
         if is_whole and not 0 <= next_one < end:  # else its length leads beyond the next one
-            if is_lost:
-                yield Damage("the length of a record is damaged")
+            if lost:
+                yield Damage("the length of a record is damaged", lost)
             yield kind, rest[at + _HEAD.size : end]
-            at, is_lost = end, False
+            at, lost = end, 0
             continue
-        is_lost = True
+        before = at
         if next_one >= 0:
             at = next_one
         elif is_end:
             at = len(rest)
         else:  # nothing likely in sight: keep the possible beginning of a record
             at = max(at + 1, len(rest) - _HEAD.size)
+        lost += at - before
 
 
 def _follows(rest: bytes, end: int) -> bool:

@@ -87,6 +87,8 @@ class Recording:
         """The tree files by path, as they were recorded."""
         self.damaged = 0
         """Messages that were passed over, and parts of its files that may have held several."""
+        self.damaged_bytes = 0
+        """Their bytes; those of a chunk as it is packed."""
         self.last_beat: float | None = None
         """The last sign of life of the process, in seconds since 1970."""
         self.tick = 0.0
@@ -106,6 +108,14 @@ class Recording:
         self._attachments = 0
         """Bytes of the attachments."""
         self.begin_part()
+
+    @property
+    def damage(self) -> str:
+        """What is damaged, in words; "" for nothing."""
+        parts = "1 part" if self.damaged == 1 else f"{self.damaged} parts"
+        verb = "is" if self.damaged == 1 else "are"
+        told = f"{parts} of the recording ({self.damaged_bytes} bytes) {verb} damaged"
+        return f"{told} or of another version" if self.damaged else ""
 
     def state(self) -> State:
         """Return the state of the run at the end of its recording. Raises RecordingError."""
@@ -143,6 +153,7 @@ class Recording:
     def items_in(self, file: BinaryIO) -> Iterator[Item]:
         """Yield the items of a file, or of more of it; raises NoMcap, OSError, RecordingError."""
         for record in records(file):
+            before = self.damaged
             if isinstance(record, Message):
                 layout = self._layouts.get(record.channel)
                 for item in () if layout is None else self._taken(record, layout):
@@ -156,8 +167,11 @@ class Recording:
                     self._layouts[record.number] = found
             elif isinstance(record, Damage):
                 self.damaged += 1
+                self.damaged_bytes += record.size
             else:
                 self._attached(record)
+            if self.damaged > before and isinstance(record, Message | Attachment):
+                self.damaged_bytes += len(record.data)
 
     # Within
 

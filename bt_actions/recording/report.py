@@ -131,9 +131,8 @@ def _read(first: Path, values: bool, leaf: str = "") -> Report:
         ends.append(line)
         count += 1
     if timeline.state.began is None:
-        damaged = timeline.recording.damaged
-        more = f": {damaged} messages in it are damaged or of another version" if damaged else ""
-        raise RecordingError(f"{first} holds no run{more}")
+        damage = timeline.recording.damage
+        raise RecordingError(f"{first} holds no run{f': {damage}' if damage else ''}")
     goes_on = is_written(first) and timeline.state.ended is None
     left_out = count - len(ends)
     return Report(
@@ -236,9 +235,8 @@ def _head(report: Report) -> Iterator[str]:
     if state.ended is not None and state.ended.world:
         yield state.ended.world
     if recording.damaged or report.lost:
-        damaged = f"{recording.damaged} damaged messages were passed over"
-        lost = f"{report.lost} events are missing"
-        yield "; ".join([damaged] * bool(recording.damaged) + [lost] * bool(report.lost))
+        lost = f"{report.lost} event{' is' if report.lost == 1 else 's are'} missing"
+        yield "; ".join(filter(None, [recording.damage, lost if report.lost else ""]))
 
 
 def _asked_by(report: Report) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import itertools
 import os
 import random
 import struct
@@ -390,6 +391,48 @@ def test_in_a_finished_file_no_damage_is_taken_for_what_happened(
         recording = Recording(path)
         items = told(list(recording.items()))
         assert recording.damaged or items == before
+
+
+def test_one_damaged_byte_of_a_finished_file_costs_what_is_packed_with_it(tmp_path: Path) -> None:
+    path, chance = tmp_path / "run.mcap", random.Random(39)
+    events = every_kind(rounds=50)
+    written(path, events)
+    finish(path)
+    data = path.read_bytes()
+    ends = ends_of_records(data[: -len(mcap_records.MAGIC)])
+    chunks = [(at, to) for at, to in itertools.pairwise(ends) if data[at] == mcap_records.CHUNK]
+    assert len(chunks) > 8
+    for at, to in chunks[1:]:
+        path.write_bytes(with_one_bit_changed(data, chance.randrange(at + 60, to), chance))
+        recording = Recording(path)
+        numbers = [each.at.number for each in recording.items() if not isinstance(each, State)]
+        assert 0.8 * len(events) < len(numbers) < len(events)
+        assert sorted(set(numbers)) == numbers
+        size = to - at
+        said = f"1 part of the recording ({size} bytes) is damaged or of another version"
+        assert recording.damage == said
+    at, _ = chunks[0]
+    path.write_bytes(data[:at] + b"\xff" + data[at + 1 :])
+    recording = Recording(path)
+    with pytest.raises(RecordingError, match="holds no run"):
+        recording.state()
+    assert recording.damaged_bytes == chunks[0][1] - at
+
+
+def test_many_damages_are_counted_with_their_bytes(
+    tmp_path: Path, sample: tuple[bytes, list[Event]]
+) -> None:
+    data, _ = sample
+    ends = [end for end in ends_of_records(data)[:-1] if data[end] == mcap_records.MESSAGE]
+    path, lost = tmp_path / "run.mcap", 0
+    for end in (ends[3], ends[8]):
+        data = data[:end] + b"\xff" + data[end + 1 :]
+        lost += ends[ends.index(end) + 1] - end
+    path.write_bytes(data)
+    recording = Recording(path)
+    list(recording.items())
+    said = f"2 parts of the recording ({lost} bytes) are damaged or of another version"
+    assert recording.damage == said
 
 
 @pytest.mark.parametrize("claim", [100_000_000, 1000], ids=["a huge one", "a small one"])

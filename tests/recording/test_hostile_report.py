@@ -6,6 +6,7 @@ import contextlib
 import copy
 import json
 import random
+import re
 import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -241,12 +242,14 @@ def test_a_run_of_another_version_is_said_to_be_one(tmp_path: Path) -> None:
     plain = [json.loads(to_line(event)) for event in every_kind()]
     plain[1]["colour"] = "red"
     path = raw(tmp_path / "run.mcap", map(json.dumps, plain))
-    assert whole(path) == f"{path} holds no run: 1 messages in it are damaged or of another version"
+    size = len(encode(LAYOUTS[EVENTS], (bytes(16), 1, 0, 0, 0, 0), ("Kind", json.dumps(plain[1]))))
+    damage = f"1 part of the recording ({size} bytes) is damaged or of another version"
+    assert whole(path) == f"{path} holds no run: {damage}"
     del plain[1]["colour"]
     plain[4]["kind"] = "Flew"
     said = whole(raw(path, map(json.dumps, plain)))
     assert said.startswith("all: STOPPED after ")
-    assert "\n  1 damaged messages were passed over; 7 events are missing\n" in said
+    assert re.search(r"\n  1 part of the recording .* version; 7 events are missing\n", said)
 
 
 def test_a_file_that_is_cut_has_a_report_of_what_is_left(tmp_path: Path) -> None:
@@ -266,7 +269,7 @@ def test_attachments_beyond_a_size_are_passed_over(
     assert "tree files mine.yaml" in whole(path)
     monkeypatch.setattr(reading, "MOST_BYTES", 10)
     assert "tree files" not in whole(path)
-    assert "1 damaged messages were passed over" in whole(path)
+    assert "1 part of the recording (11 bytes) is damaged" in whole(path)
 
 
 def test_goals_that_never_end_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

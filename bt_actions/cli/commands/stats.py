@@ -96,7 +96,7 @@ def _add(statistics: Statistics, run: Recorded) -> bool:
         note(f"bt-actions stats: passed over: {clean(str(error))}")
         return False
     if recording.damaged:
-        note(f"bt-actions stats: {recording.damaged} messages of {run.first} are damaged")
+        note(f"bt-actions stats: {run.first}: {recording.damage}")
     return True
 
 
