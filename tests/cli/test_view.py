@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import os
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from urllib.parse import parse_qsl, urlsplit
 import pytest
 
 from bt_actions.cli import main
+from bt_actions.cli.commands.view import NICE
 from bt_actions.events import RunBegan
 from tests.cli.conftest import Start
 from tests.support.every_kind import RUN_ID, every_kind
@@ -32,6 +34,7 @@ def test_the_address_is_the_one_line_of_output_and_a_signal_ends_it(start: Start
     cookie = {"Cookie": f"bt_actions_{address.port}={shown['token']}"}
     connection.request("GET", f"/run/{RUN_ID}/events", headers=cookie)
     assert connection.getresponse().status == 200
+    assert os.getpriority(os.PRIO_PROCESS, view.popen.pid) == NICE, "the ticks of a run come first"
     view.popen.send_signal(signal.SIGINT)
     assert view.popen.wait(20.0) == 130
 
@@ -44,6 +47,7 @@ def test_open_shows_the_page_in_a_browser(
     shown: list[str] = []
     monkeypatch.setattr(webbrowser, "open", shown.append)
     monkeypatch.setattr(uvicorn.Server, "run", lambda *_, **__: None)
+    monkeypatch.setattr(os, "nice", lambda _: 0)
     assert main(["view", "--open"]) == 0
     assert capsys.readouterr().out.split() == shown
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,8 @@ from bt_actions.cli.streams.writing import write
 if TYPE_CHECKING:
     from bt_actions.cli.arguments.parser import Subparsers
 
+NICE = 10
+"""By how much less the page matters than the ticks of a run."""
 _EPILOG = """\
 examples:
   bt-actions view                                # the run that goes on, else the last one
@@ -92,6 +95,7 @@ def run(args: argparse.Namespace) -> int:
                 import webbrowser
 
                 webbrowser.open(shown)
+            os.nice(NICE)
             served.run(sockets=[opened])
     except NoRun as error:
         raise BadInput(str(error)) from error
