@@ -1,11 +1,12 @@
 """The reading of a recorded run: its events in order, and the state behind missing files.
 
 The file may be a stranger's. A damaged record, an event that is none and a number that goes back
-are passed over and counted; names without end are an error.
+are passed over and counted; names and values without end are an error.
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +15,10 @@ from typing import BinaryIO, TypeAlias
 from py_trees.common import Status
 
 from bt_actions.events import (
+    AttemptEnded,
     Event,
     EventsLost,
+    FeedbackCame,
     GoalChanged,
     Moment,
     Node,
@@ -27,6 +30,7 @@ from bt_actions.events import (
     WireError,
     from_line,
 )
+from bt_actions.goals.policy import End
 from bt_actions.recording.folders import parts_of
 from bt_actions.recording.layout import (
     CHANNELS,
@@ -50,11 +54,15 @@ from bt_actions.recording.mcap_records import (
     records,
 )
 from bt_actions.recording.writing import STATUSES
+from bt_actions.story.actions import DONE
 from bt_actions.story.keeping import from_json
 from bt_actions.story.state import State
 
 MOST_NAMES = 1_000_000
 """Nodes, variables, servers and goals of one run that are read."""
+MOST_KEPT = 100_000_000
+"""Bytes of the events whose values a state of the run keeps at once, and `_ITEM` for each item."""
+_ITEM = 50
 DEEPEST = 500
 """Nodes from the root down to any node; a tree file has 200 at most."""
 LAST = 2**53 - 1
@@ -101,6 +109,11 @@ class Recording:
         self._base: int | None = None
         """Nanoseconds by which the log's time is ahead of the steady clock."""
         self._names: set[str] = set()
+        self._kept: dict[tuple[int, str], int] = {}
+        """The bytes that a state keeps of each goal of a node, and of each variable."""
+        self._kept_bytes = 0
+        self._done: defaultdict[int, set[str]] = defaultdict(set)
+        """The goals by node that a state forgets once the node begins anew."""
         self._nodes = 0
         """The number of nodes that were added."""
         self._depths: dict[int, int] = {}
@@ -158,6 +171,7 @@ class Recording:
                 layout = self._layouts.get(record.channel)
                 for item in () if layout is None else self._taken(record, layout):
                     self._check(item)
+                    self._weigh(item, record.data)
                     yield item
             elif isinstance(record, Schema):
                 self._schemas[record.number] = record.name
@@ -290,6 +304,28 @@ class Recording:
             self._nodes += len(item.nodes)
         if len(self._names) + self._nodes > MOST_NAMES:
             raise RecordingError(f"{self.first} has more names than a run can have")
+
+    def _weigh(self, item: Item, data: bytes) -> None:
+        """Bound the values that a state keeps, with the rules by which it forgets goals."""
+        if isinstance(item, GoalChanged):
+            key, done = (item.node, item.goal_id), self._done[item.node]
+            if key not in self._kept and item.attempt <= 1 and item.outcome is None:
+                self._kept_bytes -= sum(self._kept.pop((item.node, each), 0) for each in done)
+                done.clear()
+            is_open = item.state != DONE or item.end in (End.SERVER_GONE, End.UNKNOWN)
+            (done.discard if is_open else done.add)(item.goal_id)
+        elif isinstance(item, FeedbackCame | AttemptEnded):
+            key = item.node, item.goal_id
+        elif isinstance(item, VariableWritten):
+            key = 0, item.name
+        else:
+            return
+        before, size = self._kept.get(key, 0), len(data) + _ITEM * sum(map(data.count, b",[{"))
+        is_more = isinstance(item, GoalChanged | AttemptEnded)  # beside what is known of the goal
+        self._kept[key] = before + size if is_more else max(before, size)
+        self._kept_bytes += self._kept[key] - before
+        if self._kept_bytes > MOST_KEPT:
+            raise RecordingError(f"{self.first} has more values than a run can have")
 
 
 def _hex(run_id: object) -> str:

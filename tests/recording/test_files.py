@@ -18,9 +18,11 @@ import zstandard
 from py_trees.common import Status
 
 from bt_actions.events import (
+    AttemptEnded,
     Event,
     EventsLost,
     FeedbackCame,
+    GoalChanged,
     Moment,
     NodeChanged,
     RunBegan,
@@ -28,7 +30,7 @@ from bt_actions.events import (
     wire,
 )
 from bt_actions.events.bare import bare
-from bt_actions.recording import finishing, mcap_records, writing
+from bt_actions.recording import finishing, mcap_records, reading, writing
 from bt_actions.recording.finishing import finish, is_finished
 from bt_actions.recording.folders import is_written, parts_of
 from bt_actions.recording.mcap_records import Attachment
@@ -454,14 +456,52 @@ def test_a_chunk_is_passed_over_that_is_huge_whatever_size_it_claims(
 
 
 def test_names_that_never_end_are_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from bt_actions.recording import reading
-
     events = every_kind()
     monkeypatch.setattr(reading, "MOST_NAMES", 50)
     more = [VariableWritten(Moment(90 + n, 200.0, 200.0, 0.0), f"v{n}", 1, None) for n in range(60)]
     written(tmp_path / "run.mcap", [*events[:-1], *more])
     with pytest.raises(RecordingError, match="more names"):
         read(tmp_path / "run.mcap")
+
+
+@pytest.mark.parametrize("kind", ["variables", "goals", "feedback", "verdicts"])
+def test_values_that_never_end_are_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
+    events = every_kind()
+    large, more = "x" * 1000, list[Event]()
+    sent = next(each for each in events if isinstance(each, GoalChanged))
+    judged = next(each for each in events if isinstance(each, AttemptEnded))
+    for number in range(60):
+        at, own = Moment(90 + number, 200.0, 200.0, 0.0), f"{number:032x}"
+        if kind == "variables":
+            more.append(VariableWritten(at, own, large, None))
+        elif kind == "goals":
+            more.append(replace(sent, at=at, goal_id=own, state="SENDING", goal=large))
+        elif kind == "feedback":
+            more.append(FeedbackCame(at, sent.node, own, large))
+        else:
+            more.append(replace(judged, at=at, reason=large))
+    written(tmp_path / "run.mcap", [*events[:-1], *more])
+    assert len(read(tmp_path / "run.mcap")) == len(events) - 1 + len(more)
+    monkeypatch.setattr(reading, "MOST_KEPT", 60_000)
+    with pytest.raises(RecordingError, match="more values"):
+        read(tmp_path / "run.mcap")
+
+
+def test_a_long_run_has_no_more_values_than_a_state_of_it_keeps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reading, "MOST_KEPT", 20_000)
+    *events, ended = every_kind()
+    of_goals = [each for each in events if isinstance(each, GoalChanged | AttemptEnded)]
+    for turn in range(100):
+        for each in of_goals:
+            at = each.at._replace(number=len(events) + 1)
+            events.append(replace(each, at=at, goal_id=f"{turn:032x}"))
+    events.append(replace(ended, at=ended.at._replace(number=len(events) + 1)))
+    written(tmp_path / "run.mcap", events)
+    assert told(read(tmp_path / "run.mcap")) == told(list[Event | State](events))
 
 
 def test_a_file_that_is_none_is_said_to_be_none(tmp_path: Path) -> None:
