@@ -42,6 +42,8 @@ from bt_actions.utilities.shorten import fit
 
 BEAT = 1.0
 """Seconds between two heartbeats of a run."""
+PATIENCE_FOR_PLACE = 0.5
+"""Seconds in which a run that has begun gets its folder: a disk may hang."""
 PATIENCE = 5.0
 """Seconds for the last events to be written, at most: a disk may hang."""
 
@@ -135,6 +137,17 @@ class _Run:
         self._beat = 0.0
         self.first: Path | None = None
         """The first file, once the run has begun."""
+        self._is_begun = threading.Event()
+        """Whether the place of the recording is known, or that there is none."""
+
+    def place(self) -> str:
+        """Return ``HOST:PATH`` of the first file, or ""; wait until the recorder has made it."""
+        self._is_begun.wait(PATIENCE_FOR_PLACE)
+        if self.first is None or self._began is None:
+            return ""
+        return f"{self._began.where.get('host', '')}:{self.first}"
+
+    # On the recorder's thread
 
     def step(self, now: float, *, last: bool) -> bool:
         """Write all news until now; return whether the writing is over."""
@@ -158,6 +171,7 @@ class _Run:
             if isinstance(event, RunBegan) and self._began is None:
                 self._began = event
                 self._begin(event)
+                self._is_begun.set()
             self._take(event)
             time.sleep(0)  # a thread that waits for Python's lock is next
         writer = self._writer

@@ -33,6 +33,7 @@ def result(outcome: RunOutcome) -> RunTree.Result:
         outputs=outcome.outputs,
         settled=outcome.settled,
         actions=[_action(each, outcome.at) for each in outcome.actions],
+        recording=outcome.recording,
     )
 
 

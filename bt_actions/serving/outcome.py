@@ -69,6 +69,8 @@ class RunOutcome:
     actions: tuple[ActionStory, ...] = ()
     at: float = 0.0
     """The moment of the run's end, in seconds on the steady clock."""
+    recording: str = ""
+    """``HOST:PATH`` of the recording of a run that did not succeed, or ""."""
 
     @property
     def message(self) -> str:

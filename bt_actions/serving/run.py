@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 from py_trees.common import Status
@@ -31,7 +32,7 @@ class Run:
         tree: the version that was checked; a newer one does not matter any more.
         inputs: values that were checked with it.
         node: the node that goals are sent from; another thread spins it.
-        watch: called with the runner before it runs.
+        watch: called with the runner before it runs; returns what tells where the run is recorded.
         asked_by: the id of the RunTree goal, and of the run whose leaf sent it.
         begins: called with the full names of the servers that it uses, before it sends a goal.
         ended: called with the outcome, on the run's own thread, when all is over.
@@ -43,7 +44,7 @@ class Run:
         inputs: Mapping[str, object],
         node: Any,
         *,
-        watch: Callable[[TreeRunner], None] = lambda _: None,
+        watch: Callable[[TreeRunner], Callable[[], str]] = lambda _: str,
         asked_by: tuple[str, str] = ("", ""),
         begins: Callable[[set[str]], None],
         ended: Callable[[RunOutcome], None],
@@ -52,6 +53,7 @@ class Run:
         self._inputs = inputs
         self._node, self._asked_by, self._watch = node, asked_by, watch
         self._begins, self._ended = begins, ended
+        self._recording: Callable[[], str] = str
         self._lock = threading.Lock()
         self._runner: TreeRunner | None = None
         self._stream: Stream | None = None
@@ -111,6 +113,8 @@ class Run:
             outcome = outcome_of(State(), succeeded=False, error=error)
         if self._stream is not None:
             self._stream.add(RunEnded, outcome.code, "", outcome.why, outcome.unaccounted)
+        if outcome.code:
+            outcome = replace(outcome, recording=self._recording())
         self._ended(outcome)
 
     def _to_end(self) -> RunOutcome:
@@ -120,7 +124,7 @@ class Run:
         status, error = Status.INVALID, None
         runner = TreeRunner(root, node=self._node, asked_by=self._asked_by)
         self._stream = runner.stream
-        self._watch(runner)
+        self._recording = self._watch(runner)
         try:
             with self._lock:
                 self._runner, self._events = runner, runner.stream.reader()

@@ -352,10 +352,11 @@ class TreeServer:
             self._tell_of(goal, goal.begins)
             goal.run.start()
 
-    def _watch(self, runner: TreeRunner) -> None:
+    def _watch(self, runner: TreeRunner) -> Callable[[], str]:
         self._topics.follow(runner.stream)
-        if self._recorder is not None:
-            self._recorder.record(runner.stream, runner.ticks_since)
+        if self._recorder is None:
+            return str
+        return self._recorder.record(runner.stream, runner.ticks_since).place
 
     def _end(self, goal: ServedGoal, ending: Ending) -> None:
         """End a goal before its time, also one that waits for its turn."""

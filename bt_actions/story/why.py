@@ -146,10 +146,13 @@ def _attempts(failure: Failure) -> Iterator[str]:
     if action is None or not goals:
         yield clean(f"  failed{f': {failure.message}' if failure.message else ''}")
         return
-    below = opened(goals[-1].result).get("error_msg") if action.node.action == "RunTree" else ""
+    answer = opened(goals[-1].result) if action.node.action == "RunTree" else {}
+    below, recording = answer.get("error_msg"), answer.get("recording")
     if isinstance(below, str) and below:
         yield clean(f"  {goals[-1].outcome}: the run at {action.server} {_BELOW}")
         yield from (f"    {clean(line)}" for line in below.splitlines()[:BELOW])
+        if isinstance(recording, str) and recording:
+            yield clean(f"    recorded in {recording}")
         return
     told: list[tuple[int, int, str]] = []
     for goal in goals:

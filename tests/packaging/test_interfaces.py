@@ -60,6 +60,7 @@ def test_run_tree_tells_whether_every_goal_below_has_ended() -> None:
         "error_msg": "string",
         "outputs": "string",
         "settled": "boolean",
+        "recording": "string",
         "actions": "sequence<bt_actions_interfaces/ActionReport>",
     }
 

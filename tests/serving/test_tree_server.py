@@ -6,6 +6,7 @@ import asyncio
 import json
 import re
 import signal
+import socket
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,6 +20,7 @@ from bt_actions_interfaces.msg import ActionReport, TreeInfo
 from bt_actions_interfaces.srv import CheckTree, ListTrees
 from rclpy.action.server import RCLError
 
+from bt_actions.recording.reading import Recording
 from bt_actions.serving import TreeServer
 from bt_actions.serving.outcome import Code, RunOutcome
 from tests.serving.conftest import MOVE, Serve
@@ -168,6 +170,28 @@ def test_a_failure_names_the_action_to_blame_with_its_place(
     assert re.match(r"\d\d:\d\d:\d\d  Move / Go: ABORTED: .*; goal {distance: 0.2}", cause)
     assert place.startswith(f"  {folder / 'move.yaml'}:8:7; passed on by Move (")
     assert result.settled
+
+
+def test_a_failure_tells_where_its_recording_lies(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    serve("1:abort=0.1")
+    serve_trees()
+    _, failed = client.result(client.send("move", "{distance: 0.2}"))
+    host, _, path = failed.recording.partition(":")
+    assert (host, Recording(Path(path)).first) == (socket.gethostname(), Path(path))
+    assert Path(path).is_file()
+    _, succeeded = client.result(client.send("move", "{distance: 0.2}"))
+    assert (succeeded.error_code, succeeded.recording) == (R.NONE, "")
+
+
+def test_without_a_recording_a_failure_tells_of_none(
+    serve: Callable[..., Journal], serve_trees: Serve, client: TreeClient
+) -> None:
+    serve("1:abort=0.1")
+    serve_trees("--no-record")
+    _, failed = client.result(client.send("move", "{distance: 0.2}"))
+    assert (failed.error_code > R.ACTION_FAILED, failed.recording) == (True, "")
 
 
 def test_a_failure_without_an_action_to_blame_has_a_code_of_its_own(

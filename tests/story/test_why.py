@@ -221,7 +221,9 @@ def test_a_run_below_is_told_by_the_story_that_its_server_gives(
     said = why_text(state)
     outer = above.told(
         above.goal(run, "EXECUTING"),
-        above.goal(run, "DONE", **aborted, result={"error_msg": said}),
+        above.goal(
+            run, "DONE", **aborted, result={"error_msg": said, "recording": "r1:/runs/a.mcap"}
+        ),
         above.node(run, Status.FAILURE),
         above.node(above.root, Status.FAILURE),
         above.finish(Status.FAILURE),
@@ -230,6 +232,7 @@ def test_a_run_below_is_told_by_the_story_that_its_server_gives(
     assert why(outer)[1:] == [
         "  ABORTED: the run at /r1/run_tree has failed:",
         *(f"    {line}" for line in (first, *more)),
+        "    recorded in r1:/runs/a.mcap",
         "  fleet.yaml:4:7; passed on by Fleet (sequence)",
     ]
     cause = why_text(outer).splitlines()[0]
@@ -362,13 +365,13 @@ def test_a_long_cause_comes_before_failures_that_were_dealt_with() -> None:
     for leaf, holder in zip(before, tried, strict=True):
         events += [story.node(leaf, Status.FAILURE, "no"), story.node(holder, Status.SUCCESS)]
     aborted = {"outcome": Outcome.ABORTED, "end": End.ABORTED}
-    below = {"error_msg": "\n".join(f"line {number}" for number in range(9))}
+    below = {"error_msg": "\n".join(f"line {number}" for number in range(9)), "recording": "r1:/a"}
     events += [story.goal(run, "EXECUTING"), story.goal(run, "DONE", **aborted, result=below)]
     events += [story.node(each, Status.FAILURE) for each in (run, other, either, story.root)]
     state = story.told(*events, story.finish(Status.FAILURE))
     state.lost = 5
     said = lines(state)
-    assert (len(said), said[0]) == (12, "Main / Either / Run it"), said
+    assert (len(said), said[0]) == (11, "Main / Either / Run it"), said
     assert not any("dealt with" in line for line in said)
     assert any(line.startswith("5 events were lost") for line in said)
 
