@@ -69,6 +69,7 @@ def _shown(stream: Stream) -> Callable[[], None]:
     from bt_actions.cli.driving.feed import Feed
     from bt_actions.cli.views.lines import LineView
     from bt_actions.story.state import State
+    from bt_actions.utilities.batches import BATCH, LONGEST
 
     state = State()
     feed = Feed(state, LineView(state, io.StringIO(), verbose=False))
@@ -80,6 +81,9 @@ def _shown(stream: Stream) -> Callable[[], None]:
             news.wait(0.1)
             news.clear()
             time.sleep(GATHER)
+            until = time.monotonic() + LONGEST
+            while reader.is_burst and time.monotonic() < until and not ends.is_set():
+                ends.wait(BATCH)
             for event in reader.take():
                 feed.event(event)
 

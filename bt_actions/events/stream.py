@@ -37,6 +37,8 @@ from bt_actions.events.kinds import (
 
 ROOM = 20_000
 """Events that wait for one reader, before spared kinds are left out for it."""
+BURST = 20
+"""Events that come within some 50 ms, as of a chain of goals without work."""
 SPARED = (FeedbackCame, VariableWritten, NodeChanged, RoundBegan, Logged)
 """Kinds that are left out for a slow reader; events of goals and of the run never are."""
 CHANGES = 100
@@ -56,10 +58,17 @@ _Note: TypeAlias = tuple[
 class Reader:
     """The events for one reader, from `Stream.reader` on; any thread may take them."""
 
-    def __init__(self, make: Callable[[], None], poke: Callable[[], None], room: int) -> None:
-        self._events: deque[Event] = deque()
+    def __init__(
+        self, noted: deque[_Note], make: Callable[[], None], poke: Callable[[], None], room: int
+    ) -> None:
+        self._noted, self._events = noted, deque[Event]()
         self._make, self.poke, self._room = make, poke, room
         self._lost = 0
+
+    @property
+    def is_burst(self) -> bool:
+        """Whether so many events wait that the tree is better not disturbed for a moment."""
+        return BURST < len(self._events) + len(self._noted) < self._room // 2
 
     def take(self) -> list[Event]:
         """Return the events since the last call, in order.
@@ -118,7 +127,7 @@ class Stream:
         `poke` is called, on the thread of an event and under the lock, where an event comes and all
         before it were taken. `poke` must not wait, and a reader whose `poke` raises is removed.
         """
-        reader = Reader(self._make, poke, room)
+        reader = Reader(self._noted, self._make, poke, room)
         with self._making, self._lock:
             self._make_noted()
             for event in self._nodes:

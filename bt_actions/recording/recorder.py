@@ -1,8 +1,9 @@
 """The recorder of runs, on a thread of its own: one thread for all runs of a process.
 
 The thread takes the events of each run twenty times a second, lets go of Python's lock after each
-one, and writes them as one batch: no tick waits for it. A run that is killed loses its events since
-the last batch.
+one, and writes them as one batch: no tick waits for it. The events of a burst wait for its end,
+half a second at most: a chain of quick goals is not disturbed. A run that is killed loses its
+events since the last batch.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ class Recorder:
         self._wish, self._say = wish, say
         self._runs: list[_Run] = []
         self._lock = threading.Lock()
-        self._batches = Batches("recorder", self._step)
+        self._batches = Batches("recorder", self._step, self._is_burst)
 
     def record(self, stream: Stream, tick: Callable[[], float | None]) -> _Run:
         """Record a run from now on, until its RunEnded.
@@ -95,6 +96,9 @@ class Recorder:
         for run in list(self._runs):
             if run.step(time.monotonic(), last=last):
                 self._let_go(run)
+
+    def _is_burst(self) -> bool:
+        return any(run.reader.is_burst for run in list(self._runs))
 
     def _let_go(self, run: _Run) -> None:
         with self._lock:
@@ -122,7 +126,7 @@ class _Run:
         wish: Wish,
         say: Callable[[str], None],
     ) -> None:
-        self._stream, self._reader, self._tick = stream, reader, tick
+        self._stream, self.reader, self._tick = stream, reader, tick
         self._wish, self._say = wish, say
         self._began: RunBegan | None = None
         self._early: list[Event] = []
@@ -163,7 +167,7 @@ class _Run:
 
     def _write(self, now: float, *, last: bool) -> None:
         at = self._stream.now()
-        events = [*self._later, *self._reader.take()]
+        events = [*self._later, *self.reader.take()]
         self._later = [each for each in events if each.at.steady > at[0] and not last]
         taken = events[: len(events) - len(self._later)]
         self._is_over = last or any(isinstance(each, RunEnded) for each in taken)
@@ -232,7 +236,7 @@ class _Run:
 
     def end(self) -> None:
         """Close the files, and release all locks."""
-        self._stream.leave(self._reader)
+        self._stream.leave(self.reader)
         with self._locks:
             if self._writer is not None and self.first is not None:
                 with contextlib.suppress(OSError):  # a failure was told at the events

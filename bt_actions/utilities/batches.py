@@ -10,6 +10,8 @@ from collections.abc import Callable
 
 BATCH = 0.05
 """Seconds in which work gathers before a step."""
+LONGEST = 0.5
+"""Seconds in which the work of a burst gathers."""
 BEAT = 1.0
 """Seconds between two steps without work."""
 
@@ -21,8 +23,10 @@ class Batches:
     same thread.
     """
 
-    def __init__(self, name: str, step: Callable[[bool], None]) -> None:
-        self._step = step
+    def __init__(
+        self, name: str, step: Callable[[bool], None], is_burst: Callable[[], bool] = lambda: False
+    ) -> None:
+        self._step, self._is_burst = step, is_burst
         self._news = threading.Event()
         self._closing = False
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
@@ -53,5 +57,8 @@ class Batches:
             if last:
                 return
             self._news.wait(BEAT)
-            if not self._closing:
+            until = time.monotonic() + LONGEST
+            while not self._closing:
                 time.sleep(BATCH)
+                if not self._is_burst() or time.monotonic() >= until:
+                    break

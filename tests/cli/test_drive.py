@@ -19,6 +19,7 @@ from bt_actions.cli.driving.signals import SAME_WISH, Signals
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.views.lines import LineView
 from bt_actions.events import Event
+from bt_actions.events.stream import BURST
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.goals.unaccounted import GoalReport
 from bt_actions.story.state import State
@@ -104,6 +105,21 @@ def test_a_signal_interrupts_and_the_drained_run_has_its_code(
     assert run.runner.interrupted.is_set()
     assert f"interrupted by {number.name}: canceling 1 goal; Ctrl-C again" in run.out.getvalue()
     assert f"STOPPED after 1.50 s, interrupted by {number.name}" in run.out.getvalue()
+
+
+def test_a_burst_of_events_is_shown_before_the_tree_ends(leaf: FakeNode, story: Story) -> None:
+    run = Run(FakeRunner(waits=True))
+    changes = [story.node(leaf, Status.RUNNING) for _ in range(2 * BURST)]
+    run.runner.before = [*executing(story), *changes, story.verdict(leaf, Outcome.ABORTED)]
+    shown: list[bool] = []
+
+    def ends() -> Iterator[Event]:
+        shown.append("ABORTED" in run.out.getvalue())
+        yield from (story.node(leaf, Status.FAILURE), story.finish(Status.FAILURE))
+
+    run.runner.after = ends()
+    run_until(run, "ABORTED")
+    assert shown == [True]
 
 
 def test_who_waits_after_the_end_of_the_tree_is_told_for_which_goals(

@@ -25,7 +25,7 @@ from bt_actions.events import (
     RunBegan,
     RunEnded,
 )
-from bt_actions.events.stream import CHANGES, JUMP, ROOM, Stream
+from bt_actions.events.stream import BURST, CHANGES, JUMP, ROOM, Stream
 from bt_actions.story.state import State
 from tests.support.stories import state_of
 
@@ -218,6 +218,20 @@ def test_a_reader_is_poked_once_for_what_comes_to_an_empty_queue(stream: Stream)
     assert len(poked) == 2, "also where that is told with what was lost before it"
     feedback(stream)
     assert len(poked) == 2
+
+
+def test_a_reader_sees_a_burst_but_not_once_half_its_room_is_taken(stream: Stream) -> None:
+    reader, other = stream.reader(room=100), stream.reader()
+    for _ in range(BURST):
+        feedback(stream)
+    assert not reader.is_burst
+    feedback(stream)
+    assert reader.is_burst
+    other.take()
+    assert (reader.is_burst, other.is_burst) == (True, False), "made events count as noted ones"
+    for _ in range(50 - BURST):
+        feedback(stream)
+    assert not reader.is_burst, "else events would be lost"
 
 
 def test_a_jump_of_the_wall_clock_is_told_before_the_event_that_shows_it(

@@ -30,6 +30,7 @@ from bt_actions.events import RunEnded, StopWanted
 from bt_actions.events.stream import Stream
 from bt_actions.running.telling import where_raised
 from bt_actions.story.state import State
+from bt_actions.utilities.batches import BATCH, LONGEST
 
 GATHER = 0.02
 """Seconds in which events gather before they are taken: each take needs Python's lock."""
@@ -104,10 +105,15 @@ class Drive:
         deadline = None if self._timeout is None else began + self._timeout
         self._deadline = deadline
         thread.start()
-        drawn = began - FRAME
+        drawn = taken = began - FRAME
         while not self.abandoned:
             finished, now = self._finished.is_set(), self._clock()  # before the queue is emptied
-            self._take_events()
+            is_late = deadline is not None and now >= deadline
+            is_soon = now - taken < LONGEST and not (finished or is_late)
+            gathers = is_soon and self._events.is_burst
+            if not gathers:
+                self._take_events()
+                taken = now
             if finished:
                 thread.join()
                 break
@@ -115,18 +121,19 @@ class Drive:
                 deadline = None  # no goal is left to end
             if deadline is not None and now >= deadline:
                 self._end(Exit.TIMEOUT, f"--timeout {self._timeout:g} s expired")
-            if now - drawn >= FRAME:
+            if now - drawn >= FRAME and not gathers:
                 self._feed.frame(now)
                 drawn = now
-            wait = max(0.0, drawn + FRAME - now)
+            wait = BATCH if gathers else max(0.0, drawn + FRAME - now)
             if deadline is not None:
                 wait = min(wait, max(0.0, deadline - now))
             received, ready = self._signals.wait(
                 wait, readable=self._feed.view.fileno, writable=self._watched
             )
-            if not (received or self._finished.is_set()):
+            if received:
+                self._take_events()  # events from before the signal
+            elif not (gathers or self._finished.is_set()):
                 time.sleep(GATHER)
-            self._take_events()  # events from before the signal
             for signal in received:
                 self._signalled(signal)
             if self._watched in ready:
