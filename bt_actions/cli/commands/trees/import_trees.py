@@ -20,7 +20,7 @@ examples:
   bt-actions import main.xml parts.xml -o trees --map robot.yaml --report
 
 exit codes:
-  0 all nodes were written   1 some were refused   2 a file cannot be read, or none written
+  0 no node was refused   1 some nodes were refused   2 a file cannot be read or written
 """
 
 
@@ -28,9 +28,9 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "import",
-        help="write trees of BehaviorTree.CPP and Nav2 as trees of ours",
+        help="write XML trees of BehaviorTree.CPP and Nav2 as YAML",
         description="Write the trees of BehaviorTree.CPP's XML (3 and 4) as YAML, one file a tree. "
-        "A failure, and a line of the report, stand for each node that has no equal here.",
+        "A failure replaces each node that our language cannot express, and the report names it.",
         epilog=_EPILOG,
     )
     parser.add_argument("files", metavar="FILE", nargs="+", type=Path, help="a file of XML")
@@ -41,12 +41,12 @@ def add_parser(subparsers: Subparsers) -> None:
         "--map",
         metavar="FILE",
         type=Path,
-        help="the leaves here for those of your own; Nav2's are known",
+        help="a map: the YAML of each leaf of your own; the importer knows Nav2's",
     )
     parser.add_argument(
         "--report",
         action="store_true",
-        help="tell of every node and attribute; else of what was refused, dropped or differs",
+        help="report converted nodes and attributes, too, not only others",
     )
 
 
