@@ -62,28 +62,29 @@ HEAD = f"""\
 
 <!-- Made by scripts/yaml_doc.py from bt_actions/document/language/. Do not edit. -->
 
-A tree is a YAML file. `bt-actions check` finds what is wrong with it before a robot moves,
-`bt-actions format` puts it in canonical form, and `bt-actions schema` prints a JSON Schema for
-completion in editors. The files on this page are in `examples/`.
+A tree is a YAML file. `bt-actions check` finds mistakes in the file before a robot moves,
+`bt-actions format` puts the file in canonical form, and `bt-actions schema` prints a JSON Schema
+for completion in editors. The files on this page are in `examples/`.
 
 @fetch
 
 ## Rules
 
-- A node is a mapping with **exactly one key that is a kind or the name of an action** that the tree
-  declares. The order of keys is free. The section of a kind says whether the kind's value is the
-  node's name, which has no colon; the value of any other kind says what the node does, and `name:`
-  is optional.
-- `timeout` and `retry` are settings of an action, and kinds only beside `child:`.
+- A node is a mapping with **exactly one key that is a kind, or the name of an action** that the
+  tree declares. The order of keys is free.
+- The value of most kinds is the name of the node, which has no colon. The value of other kinds
+  says what the node does (`wait: 5 s`), and such a node may have a `name:`. The section of a kind
+  says which.
+- `timeout` and `retry` are settings beside an action, and kinds of nodes beside `child:`.
 - Unknown keys, double keys and values of the wrong form are errors.
-- Scalars are those of YAML 1.2: `on` and `yes` are texts, U+2028, U+2029 and U+0085 end no line,
+- Scalars follow YAML 1.2: `on` and `yes` are texts, U+2028, U+2029 and U+0085 end no line,
   and in double quotes the two halves that JSON writes (`"\\ud83d\\ude00"`) are one character.
-  libyaml reads the files; PyYAML's wheels hold it.
+  libyaml reads the files, and comes with the wheels of PyYAML.
 - Durations carry a unit ({", ".join(f"`{unit}`" for unit in DURATION_UNITS)}); a bare number is
-  seconds, with a warning from 500 on. Deadlines and pauses are never negative. `none` is no limit,
-  where a limit can be left out.
-- Numbers and durations are plain, so that deadlines can be checked before a robot moves; where
-  `$name` may stand for one, the tables say "or `$name`".
+  seconds, with a warning from 500 on. Deadlines and pauses are never negative. Where a
+  limit is optional, `none` means no limit.
+- Numbers and durations are constants, so that `check` knows deadlines before a robot moves. Where
+  a variable is possible, the tables say "or `$name`".
 
 ## Values
 
@@ -96,34 +97,36 @@ completion in editors. The files on this page are in `examples/`.
 | `"@points.yaml"` | the data in a file beside the tree: for large values (.yaml, .yml, .json) |
 
 A tree sees only its own names: inputs, outputs, topics, and the names that its nodes `save`, `set`
-or loop over. A subtree gets the values that `with` passes and gives back outputs by `save`. Each
-visit of a subtree begins without the values of the visit before, but for those written below a
-`run_once`; an output without a value leaves the outer name as it was. A variable without a value
-makes a goal INVALID_GOAL and a check FAILURE, with the reason; a `log` has `(no value)` in its
-place. `known($name)` asks whether there is one.
+or loop over. A subtree gets the values of `with`, and gives back outputs by `save`. Each visit of a
+subtree begins without the values of the visit before, except values that a node below a `run_once`
+wrote. An output without a value does not change the variable of the caller.
+
+A variable without a value makes a goal INVALID_GOAL, and a check FAILURE, with the reason. A `log`
+writes `(no value)`. `known($name)` tells whether the variable has a value.
 
 Types of inputs and outputs are `bool`, `string`, `float32`, `float64`, `byte`, `int8` to `int64`,
 `uint8` to `uint64`, any `package/msg/Name`, and lists of them: `float64[]`, `float64[3]`,
-`float64[<=3]`. A whole number is a fine float; a fraction is no whole number. Goals and messages
+`float64[<=3]`. A float takes a whole number, but an integer takes no fraction. Goals and messages
 may hold `.inf` and `.nan`; inputs are finite. A mapping in a tree (`set: {{stop: {{at: 2.0}}}}`,
-the items of a `for_each`) has the keys that are written there (`$stop.at`), and may fill a message.
-Names of nodes stand as they are: a `$name` in one is not replaced.
+the items of a `for_each`) has its own keys (`$stop.at`), and may fill a message. The name of a node
+is constant: a `$name` in a node's name has no effect.
 
 Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fields, indices and
 slices (`$list[-1]`, `$list[1:3]`), `1 if $empty else 2`, `true` and `false`, and constants
 (`MoveRobot.Result.STATUS_FAULT`). A plus sign also joins two texts, and two lists:
 `= $names + ['part ' + str($count)]`. In `expect`, `save` and `when` the bare name `result` is the
-result, and `outputs` of a `run_tree` has the outputs of its tree; in `until` and `save` of
-`wait_for_message`, `message` is the message. A float32 is read as the shortest number that
-stands for it: 0.7, not 0.699999988. The functions are:
+result, and in a `run_tree` the name `outputs` has the outputs of the tree. In `until` and `save` of
+`wait_for_message`, `message` is the message. A float32 has the value of its shortest decimal: 0.7,
+not 0.699999988. The functions are:
 
 | function | gives |
 |---|---|
 {ROWS}
 
-In the fields of a message, and in variables that fill them (but for `now` and constants):
+Some fields of messages have short forms. Variables that fill such a field may have them, too,
+except `now` and constants:
 
-| field | may be written |
+| field | short forms |
 |---|---|
 | builtin_interfaces/Time | `now`, seconds, or `{{sec, nanosec}}` |
 | builtin_interfaces/Duration | `500 ms`, `-1 s`, seconds, or `{{sec, nanosec}}` |
@@ -134,18 +137,18 @@ In the fields of a message, and in variables that fill them (but for `now` and c
 
 ## Silencing a warning
 
-`# bt: ignore[BT301] why`, on the line, or alone on a line above it. Errors cannot be silenced. The
-rules are in [rules.md](rules.md), and `bt-actions explain BT301` prints one.
+Write `# bt: ignore[BT301] why` on the line, or alone on a line above. No comment silences an error.
+[rules.md](rules.md) has the rules, and `bt-actions explain BT301` prints one.
 
 """
 RULES_HEAD = """\
 A finding names its place and its rule: `fetch.yaml:10:13: error[BT203]: ...`. `bt-actions explain
-BT203` prints the section of that rule from this page. A tree with an error does not run; one with
-warnings does. `# bt: ignore[BT301] why` on a line silences a warning there, never an error.
+BT203` prints the section of that rule from this page. A tree with an error does not run; a tree
+with warnings does. `# bt: ignore[BT301] why` on a line silences a warning there, never an error.
 
-## What a first tree meets
+## The most common findings
 
-| code | | what to do |
+| code | finding | what to do |
 |---|---|---|"""
 FIRST_MET = {
     "BT102": "indent as the lines around; put a text that holds `: ` in quotes",
@@ -170,46 +173,49 @@ The key is a name under `actions`, its value the node's name.
 """
 ALIAS_EXAMPLE = "move: To the part\ngoal: {distance: 2.0}\nretry: 3"
 IMPORT = """\
-`actions`, `topics`, `kinds` and `defaults` from other files, which are found as subtrees are. A
-`$name` in such a file is a variable of the importing tree, and is checked there."""
+`import` adds the `actions`, `topics`, `kinds` and `defaults` of other files. The search for such a
+file is that for a [subtree](#where-trees-are-found). A `$name` in the file is a variable of the
+importing tree."""
 WHERE = """\
 ## Where trees are found
 
-`subtree:` and `import:` take a path beside their own file, `bt-actions` and `load_tree` one from
-the current folder; `.yaml` and `.yml` may be left out. A name without a folder, and without a file
-there, stands for an installed tree. The search goes in this order: the folders of
-`BT_ACTIONS_TREE_PATH` (separated as in `PATH`), the trees of bt_actions, and `share/PACKAGE/trees`
-of every package in the sourced ROS workspaces. A package of yours installs its trees there, with
-its `setup.py` or CMakeLists.txt; `package://PACKAGE/trees/NAME.yaml` names a tree of one package.
+Paths in `subtree:` and `import:` begin at the folder of their own file. Paths for `bt-actions` and
+`load_tree` begin at the current folder. You may leave `.yaml` and `.yml` away.
+
+A name without a folder, and without a file of that name, stands for an installed tree. The search
+goes through the folders of `BT_ACTIONS_TREE_PATH` (separated as in `PATH`), the trees of
+bt_actions, and `share/PACKAGE/trees` of every package in the sourced ROS workspaces, in this order.
+A package of yours installs its trees there, with its `setup.py` or CMakeLists.txt.
+`package://PACKAGE/trees/NAME.yaml` names a tree of one package.
 """
 BUSY = """\
-What to do when the goal's server, or one of its `resources`, is taken by another goal of this
-process:
+`busy` says what a goal does when another goal of this process has its server, or one of its
+`resources`:
 
-| | |
+| `busy` | the goal |
 |---|---|
 """
 ON_CHANGE = """\
-While the goal executes, its fields are computed anew at each tick. Where they differ from those of
-the sent goal (`now` apart):
+Each tick computes the fields of the goal anew while the goal executes. `on_change` says what the
+leaf does when they differ from the fields of the sent goal (`now` does not count):
 
-| | |
+| `on_change` | the leaf |
 |---|---|
-| `ignore` | nothing is done |
-| `replace` | the new goal is sent at once; the old one is canceled after `timeout.cancel`, \
-or when the node ends |
-| `cancel` | the goal is canceled, and the new one is sent after its end |
+| `ignore` | keeps its goal |
+| `replace` | sends the new goal at once; the leaf cancels the old goal after `timeout.cancel`, \
+or at its own end |
+| `cancel` | cancels the goal, and sends the new one after the end of the old one |
 
-The node stays RUNNING, and the end of the newest goal alone counts. `timeout.result` runs on, and
-no attempt is used. A goal that cannot be built is not sent, and the old goal runs on; a refused
-goal ends the attempt, and the old goal is canceled. A change while a goal is being sent, or while a
-replaced goal has to end, waits, and the newest change counts: two goals live at once at most. On a
-`subtree`, `on_change: pass` hands changed inputs on.
+The node stays RUNNING, and only the end of the newest goal counts. `timeout.result` runs on, and a
+replacement uses no attempt. When a new goal cannot be built, the old goal runs on. When the server
+refuses a new goal, the leaf cancels the old one, and the attempt ends. At most two goals live at
+once: a further change waits, and the newest change counts. On a `subtree`, `on_change: pass` passes
+changed inputs on.
 """
 QOS = """\
 ### `qos`
 
-| | |
+| `qos` | quality of service |
 |---|---|
 | `default` | reliable, the last 10 messages, none from before the subscription |
 | `sensor` | best effort, the last 5 messages: ROS's profile for sensor data |
@@ -217,51 +223,60 @@ QOS = """\
 | `best_effort` | as `default`, but best effort |
 | `services` | ROS's profile for services |
 
-A subscription that asks for more than its publisher offers hears nothing: `default` and `latched`
-of a best effort publisher, `latched` of a publisher that keeps nothing.
+A subscription gets no message where it asks for more than the publisher offers: `default` and
+`latched` with a best effort publisher, and `latched` with a publisher that keeps no message.
 """
 OWN_KINDS = """\
-Classes of your own, used as kinds: `shorten: A metre` with `with: {path: $path}`, `save: {short:
-path}`, and `child` or `children`. A class is a behaviour of py_trees that is made with its name,
-and its `child` or `children`. The class reads `self.inputs.path`, which is computed at that moment,
-and sets `self.outputs.path`; outputs are written at the end of the visit, all or none. Where an
-input has no value, or an output does not fit, the node fails."""
+A class of your own may be a kind: `shorten: A metre` with `with: {path: $path}`, `save: {short:
+path}`, and `child` or `children`. The class is a behaviour of py_trees, made with its name, and its
+`child` or `children`. The class reads `self.inputs.path`, computed at that moment, and sets
+`self.outputs.path`. The node writes all outputs at the end of the visit, or none. Where an input
+has no value, or an output does not fit, the node fails."""
 TOPICS = """\
-The latest message of a topic, read as a variable. While the first message may still be on its way
-(the process is younger than 3.5 s, or subscribed less than a second ago to a publisher that is
-there), a node that reads the topic is `RUNNING`; afterwards the message counts as missing, and a
-check fails. So does `check: not $door.data` then; an `invert` around `check: $door.data` succeeds:
-its child failed. A branch for a topic without a message begins with `check: not known($door)`."""
+The variable of a topic has the latest message. A node that reads the variable is `RUNNING` while
+the first message may still be on its way: in the first 3.5 s of the process, and for a second after
+a subscription to a publisher in sight. Afterwards the message counts as missing, and a check fails.
+
+Without a message `check: not $door.data` fails, too. An `invert` around `check: $door.data`
+succeeds, as its child has failed. `check: not known($door)` begins a branch for a topic without a
+message."""
 DEFAULTS = """\
-`timeout`, `retry` and `busy` for all actions. Settings merge key by key, and the nearest wins: the
-node's own, the action's under `actions`, the tree's `defaults`, the imported `defaults`."""
+`defaults` has `timeout`, `retry` and `busy` for all actions. Settings merge key by key, and the
+nearest wins: first those of the node, then those under `actions`, the `defaults` of the tree, the
+`defaults` of an imported file."""
 NAMESPACE = """\
-Names of actions, services and topics are relative where they begin without a slash. The namespaces
-of the node, of the trees and subtrees around it, and its own go before a relative name.
+The name of an action, a service or a topic is relative where the name begins without a slash. A
+relative name stands in the namespaces of the ROS node, of the trees around the leaf, and of the
+leaf itself.
 
-`$(robot)` in a name, or in a namespace, is an input of type string: `server: $(robot)/move`. Its
-value has to be known before the tree runs: an input of the root tree, or of a subtree whose `with`
-gives a constant or such an input."""
+`$(robot)` in a name, or in a namespace, is an input of type string: `server: $(robot)/move`. The
+value must be known before the tree runs. So `robot` is an input of the root tree, or an input of a
+subtree whose `with` gives a constant or such an input."""
 LEFT_OUT = """\
-Both may stand beside any kind. A node is left out where `only_if` is false at its begin, where
-`only_while` is false before a tick (the nodes that run below are stopped, and the node is `RUNNING`
-until their goals have ended), and where all of its children were left out. Its parent goes on as if
-the node were not there:
+Both may stand beside any kind. A node is left out in three cases:
 
-| parent | does |
+- `only_if` is false at the begin of the node.
+- `only_while` is false before a tick. The node stops all nodes below, and is `RUNNING` until their
+  goals have ended.
+- All of its children were left out.
+
+The parent goes on as if the node were not there:
+
+| parent | reaction |
 |---|---|
 | `sequence`, `pipeline`, `fallback` | goes on to the next child |
-| `parallel` | asks again at each tick; meanwhile the node counts for `all`, not for `at_least` |
-| `repeat` without `times` | stays RUNNING, and asks at the next tick |
-| `for_each` | goes on to the next item; this one has neither succeeded nor failed |
-| any other decorator, `if`, `subtree` | is left out with it |
+| `parallel` | computes the condition again at each tick; meanwhile the node counts for `all`, \
+not for `at_least` |
+| `repeat` without `times` | stays RUNNING, and computes the condition at the next tick |
+| `for_each` | goes on to the next item; the item has neither succeeded nor failed |
+| any other decorator, `if`, `subtree` | is left out, too |
 | `recover` of a `retry` | the retry fails |
 | the root | SUCCESS |
 
-A gate waits as a `check` does while the first message of a topic may come. Afterwards a condition
-that cannot be computed fails the node: `known($door)` asks for a value. py_trees has no status for
-a node that is left out: its status is SUCCESS below a sequence and FAILURE below a fallback, with
-the reason as its message (`left out: $near is false`).
+A condition waits for the first message of a topic, as a `check` does. Afterwards a condition
+without a value fails the node: `known($door)` asks for a value. py_trees has no status for a node
+that is left out. Its status is SUCCESS below a sequence and FAILURE below a fallback, with the
+reason as its message (`left out: $near is false`).
 """
 SHOWN = {"if": "recovering", "pipeline": "following"}
 """The examples that stand below the last of their kinds."""
@@ -344,8 +359,9 @@ def retry_text() -> str:
 
     return (
         "`3` is short for `{attempts: 3}`. Without `outcomes`, another attempt follows "
-        f"{listed(RETRIED_BY_DEFAULT)}. {listed(RETRIED_IF_NAMED)} have to be named: the goal may "
-        "have been executed. [goal.md](goal.md#outcomes-and-ends) explains each."
+        f"{listed(RETRIED_BY_DEFAULT)}. After {listed(RETRIED_IF_NAMED)} the server may have "
+        "executed the goal, so another attempt follows only where `outcomes` names them. "
+        "[goal.md](goal.md#outcomes-and-ends) explains each outcome."
     )
 
 
@@ -355,11 +371,12 @@ def yaml_page() -> str:
         r"^@(\w+)$", lambda match: example(match[1]), HEAD.rstrip("\n"), flags=re.MULTILINE
     )
     lines = [head, "", "## The file", "", *table(TOP_KEYS.values())]
-    lines += record("`inputs`", "Each is a mapping, or just its type.", INPUT)
-    lines += record("`outputs`", "Each is a mapping, or just its type.", OUTPUT)
+    lines += record("`inputs`", "An input is a mapping, or only its type.", INPUT)
+    lines += record("`outputs`", "An output is a mapping, or only its type.", OUTPUT)
     lines += record(
         "`actions`",
-        "Settings merge key by key: `defaults`, then the action's here, then the node's.", ALIAS,
+        "A setting of a leaf wins over the setting here, and the setting here over `defaults`.",
+        ALIAS,
     )  # fmt: skip
     lines += record("`topics`", TOPICS, TOPIC)
     lines += [example("topics"), ""]
@@ -374,7 +391,7 @@ def yaml_page() -> str:
     lines += record("`retry` of an action", retry_text(), RETRY)
     text = "`5 s` is short for `{response: 5 s}`."
     lines += record("`timeout` of a service", text, SERVICE_TIMEOUT)
-    lines += record("`retry` of a service", "As an action's.", SERVICE_RETRY)
+    lines += record("`retry` of a service", "As for an action.", SERVICE_RETRY)
     lines += WHERE.split("\n")
     lines += ["## What is left out", "", *table(GATES.values()), *LEFT_OUT.split("\n")]
     for group, title in TITLES.items():
@@ -397,7 +414,7 @@ def rules_page() -> str:
         *(f"| [{code}](#{code.lower()}) | {RULES[code].title} | {remedy} |"
           for code, remedy in FIRST_MET.items()), "",
         "## All rules", "",
-        "| code | | |", "|---|---|---|",
+        "| code | severity | finding |", "|---|---|---|",
         *(f"| [{rule.code}](#{rule.code.lower()}) | {rule.severity} | {rule.title} |"
           for rule in RULES.values()), "",
     ]  # fmt: skip

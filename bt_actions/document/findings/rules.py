@@ -14,22 +14,21 @@ from bt_actions.document.findings.hazards import HAZARDS, MOVE, SUCCESS, moving,
 _CAFE = r"printf 'tree: t\nroot: {success: Caf\351}\n' "
 _RULES = (
     Rule("BT100", "the file cannot be read",
-        "The file is not there, is a directory, may not be read, or is larger than a tree can be. "
-        "Trees are found by their path, or by the name of an installed tree. (The examples are "
-        "commands of a shell.)",
+        "The file does not exist, is a directory, is too large for a tree, or its permissions "
+        "forbid reading. A path, or the name of an installed tree, names a tree. (The examples "
+        "are commands of a shell.)",
         "bt-actions check pick_and_plac\n",
         "bt-actions check pick_and_place\n",
     ),
     Rule("BT101", "the file is no text",
-        "Trees are written in UTF-8, without control characters. Save the file as UTF-8; most "
-        "editors can. (The examples are commands of a shell: the é of Latin-1, as it is and "
-        "converted.)",
+        "A tree is UTF-8, without control characters. Save the file as UTF-8; most editors can. "
+        "(The examples are commands of a shell: an é in Latin-1, and the same é in UTF-8.)",
         _CAFE + "| bt-actions check -\n",
         _CAFE + "| iconv -f latin1 -t utf-8 | bt-actions check -\n",
     ),
     Rule("BT102", "this is not YAML",
-        "The text is not YAML, so that nothing else in it can be checked. Most often the "
-        "indentation differs from the lines around, or a text with ': ' needs quotes.",
+        "The text is not YAML, so no other rule can check the file. Most often the indentation "
+        "differs from the lines around, or a text with ': ' needs quotes.",
         tree("root:\n  log: ready: go\n"),
         tree('root:\n  log: "ready: go"\n'),
     ),
@@ -39,15 +38,14 @@ _RULES = (
         tree("root:\n  success: Done\n"),
     ),
     Rule("BT104", "a key is here twice",
-        "A key stands twice in one mapping. YAML tools keep one of the two, and not all tools the "
-        "same one.",
+        "One mapping has a key twice. Some YAML tools would keep the first value, others the last.",
         tree("root:\n  success: Done\n  success: Again\n"),
         tree("root:\n  success: Done\n"),
     ),
     Rule("BT105", "nested too deep, or too large when unfolded",
-        "The document is nested deeper than 200 levels, its tree and all that it includes is more "
-        "than 200 nodes deep, it stands in more than 50 trees or 100 files, an anchor holds "
-        "itself, or aliases and subtrees unfold to more nodes than a tree can have.",
+        "The limits of a document: 200 levels of YAML; 200 levels of nodes, with all included "
+        "trees; 50 trees and 100 files; no anchor inside of itself; no more nodes, after aliases "
+        "and subtrees are unfolded, than a tree can have.",
         tree("root: &loop\n  sequence: Loop\n  children: [*loop]\n"),
         tree("root:\n  repeat: Loop\n  times: 3\n  child: {success: Done}\n"),
     ),
@@ -58,26 +56,26 @@ _RULES = (
         tree(SUCCESS),
     ),
     Rule("BT107", "unknown key",
-        "No such key can stand here. Nothing is ignored silently: a misspelt key would otherwise "
-        "do nothing, unnoticed.",
+        "This place has no such key. Without the rule, a misspelt key would have no effect, and "
+        "nobody would notice.",
         tree("root:\n  sequence: Work\n  memroy: false\n  children: [{success: Done}]\n"),
         tree("root:\n  sequence: Work\n  memory: false\n  children: [{success: Done}]\n"),
     ),
     Rule("BT108", "a key is missing",
-        "A key that must be there is missing.",
+        "The mapping lacks a required key.",
         tree("root:\n  invert: Not done\n"),
         tree("root:\n  invert: Not done\n  child: {success: Done}\n"),
     ),
     Rule("BT109", "a value has the wrong form",
-        "A value is a list, a mapping or a text where another form is needed. YAML 1.2 reads "
+        "A value is a list, a mapping or a text where the key takes another form. YAML 1.2 reads "
         "'yes', 'no', 'on' and 'off' as texts: write true and false.",
         tree("root:\n  sequence: Work\n  memory: no\n  children: [{success: Done}]\n"),
         tree("root:\n  sequence: Work\n  memory: false\n  children: [{success: Done}]\n"),
     ),
     Rule("BT110", "a value is out of its range",
-        "The value is of the right form, but cannot be: an unknown word, a duration with an "
-        "unknown unit, a number out of its range. Units of time are ns, us, ms, s, sec, min and h;"
-        " a bare number is seconds.",
+        "The value has the right form, but is an unknown word, a duration with an unknown unit, "
+        "or a number out of its range. Units of time are ns, us, ms, s, sec, min and h; a bare "
+        "number is seconds.",
         tree("root: {wait: 5 sconds}\n"),
         tree("root: {wait: 5 s}\n"),
     ),
@@ -96,8 +94,8 @@ _RULES = (
         ),
     ),
     Rule("BT113", "a name that cannot be used",
-        "Names of nodes are one line without a colon, since tools that draw trees take 'a:b' for a"
-        " port of the node 'a'. Names of variables and actions are letters, digits and "
+        "The name of a node is one line without a colon: tools that draw trees read 'a:b' as a "
+        "port of the node 'a'. Names of variables and actions consist of letters, digits and "
         "underscores.",
         tree('root: {success: "Step 1: done"}\n'),
         tree('root: {success: "Step 1, done"}\n'),
@@ -115,9 +113,9 @@ _RULES = (
         tree("inputs: {level: float64}\nroot: {log: The level is $(level) now}\n"),
     ),
     Rule("BT116", "a text was cut by '#'",
-        "A '#' behind a space begins a comment, wherever it stands. Put a text with a '#' in "
-        "quotes. A '#' with a space behind is a comment that is meant, and gets no warning; nor "
-        "does one behind numbers, times and single words of the language.",
+        "A '#' after a space begins a comment, also inside of a text. Put a text with a '#' in "
+        "quotes. A '#' with a space on both sides gets no warning, and neither does a '#' after "
+        "numbers, times and single words of the language.",
         tree("root: \n  success: Part #3\n"),
         tree('root: \n  success: "Part #3"\n'),
         Severity.WARNING,
@@ -134,14 +132,14 @@ _RULES = (
         moving("inputs: {d: 'float64[]'}\nroot:\n  move: Go\n  goal: {distance: $d.0}\n"),
     ),
     Rule("BT119", "an ignore that names no rule",
-        "An ignore names the warnings it silences: # bt: ignore[BT301] and why. An error cannot be"
-        " silenced.",
+        "An ignore names the warnings that it silences: # bt: ignore[BT301] and the reason. No "
+        "ignore silences an error.",
         tree("root: {success: Done}  # bt: ignore\n"),
         tree("root:\n  retry: Ever  # bt: ignore[BT304] an operator stops it\n"
              "  child: {success: Done}\n"),
     ),
     Rule("BT120", "an ignore that silences nothing",
-        "This ignore silences nothing. It may have been of use once; now it would hide a later "
+        "No warning needs this ignore any more. Remove the ignore, as it would hide a later "
         "finding.",
         tree("root: {success: Done}  # bt: ignore[BT304] no longer a retry\n"),
         tree(SUCCESS),
@@ -149,7 +147,7 @@ _RULES = (
     Rule("BT121", "a name that ROS does not take",
         "The names of topics, services, actions and namespaces are letters, digits and underscores"
         " between slashes; no part begins with a digit. '/' at the beginning makes a name "
-        "absolute, '~/' one of the node's own. ROS refuses all others when the tree starts.",
+        "absolute, '~/' one of the node's own. ROS refuses other names when the tree starts.",
         tree("root: {publish: the lamp, type: std_msgs/msg/Bool}\n"),
         tree("root: {publish: the_lamp, type: std_msgs/msg/Bool}\n"),
     ),
@@ -159,53 +157,53 @@ _RULES = (
         moving("root:\n  sequence: Work\n  children:\n    - move: Go\n    - move: Back\n"),
     ),
     Rule("BT202", "unknown variable",
-        "A tree sees only its own names: its inputs, outputs and topics, and what its nodes save, "
-        "set or loop over.",
+        "A tree sees only its own names: its inputs, outputs and topics, and the variables that "
+        "its nodes save, set or loop over.",
         tree("inputs: {level: float64}\nroot: {check: $levle > 0.2}\n"),
         tree("inputs: {level: float64}\nroot: {check: $level > 0.2}\n"),
     ),
     Rule("BT203", "a message has no such field",
-        "The ROS message in question has no field of this name. `bt-actions interfaces show TYPE` "
+        "The ROS message has no field of this name. `bt-actions interfaces show TYPE` "
         "prints its fields.",
         moving("root:\n  move: Go\n  goal: {distnace: 2.0}\n"),
         moving("root:\n  move: Go\n  goal: {distance: 2.0}\n"),
     ),
     Rule("BT204", "a value does not fit its type",
-        "A value does not fit the type that is needed. A whole number is a fine float; a fraction "
-        "is no whole number, and a number in quotes is a text.",
+        "The field or variable has another type than the value. A float takes a whole number, an "
+        "integer takes no fraction, and a number in quotes is a text.",
         moving('root:\n  move: Go\n  goal: {distance: "2.0"}\n'),
         moving("root:\n  move: Go\n  goal: {distance: 2.0}\n"),
     ),
     Rule("BT205", "a type is not installed",
         "The package of this action, service or message is not installed here, or has no type of "
         "this name. `bt-actions interfaces list` prints the installed types. Source the workspace "
-        "that the package is built in; without a workspace, `bt-actions interfaces build PATH` "
-        "builds and installs the package from its sources. Or check with --no-types.",
+        "of the package; without a workspace, `bt-actions interfaces build PATH` builds and "
+        "installs the package from its sources. `check --no-types` does not look for types.",
         "tree: example\n" + MOVE.replace("MoveRobot", "MoveRobt")
         + "root: {move: Go, goal: {distance: 1.0}}\n",
         moving("root: {move: Go, goal: {distance: 1.0}}\n"),
     ),
     Rule("BT206", "an expression does not fit its types",
-        "An expression does something that the types of its parts do not allow.",
+        "The types of the parts do not allow this operation.",
         tree("inputs: {label: string}\nroot: {check: $label > 1}\n"),
         tree("inputs: {label: string}\nroot: {check: len($label) > 1}\n"),
     ),
     Rule("BT207", "unknown type",
-        "This names no type. Plain types are bool, string, float32, float64, byte, and int and "
+        "No type has this name. Plain types are bool, string, float32, float64, byte, and int and "
         "uint with 8 to 64 bits; others are package/msg/Name. Lists are written float64[], "
         "float64[3] and float64[<=3].",
         tree("inputs: {level: float}\nroot: {check: $level > 1}\n"),
         tree("inputs: {level: float64}\nroot: {check: $level > 1}\n"),
     ),
     Rule("BT208", "an action's name hides a kind or a key of nodes",
-        "An action's name may not be that of a kind, or of a key that nodes have: the two could "
-        "not be told apart.",
+        "An action has the name of a kind, or of a key of nodes. A node with that key would have "
+        "two meanings.",
         "tree: example\n" + MOVE.replace("  move:", "  wait:") + "root: {wait: 5 s}\n",
         moving("root:\n  sequence: Work\n  children: [{move: Go}, {wait: 5 s}]\n"),
     ),
     Rule("BT209", "a tree that is included cannot be read",
-        "An included tree, or an imported file, cannot be read. The search goes beside this file, "
-        "then by its name in BT_ACTIONS_TREE_PATH and in the installed packages.",
+        "An included tree, or an imported file, cannot be read. The search looks beside this file, "
+        "then for the name in BT_ACTIONS_TREE_PATH and in the installed packages.",
         tree("root: {subtree: no_such_tree.yaml}\n"),
         tree("root: {subtree: recover}\n"),
     ),
@@ -232,28 +230,29 @@ _RULES = (
         tree("outputs: {at: float64}\nroot: {subtree: pick_and_place, save: {at: final_pose}}\n"),
     ),
     Rule("BT214", "a class cannot be used as a behaviour",
-        "'python' must name a py_trees behaviour that can be imported here.",
+        "'python' names no py_trees behaviour that Python can import here.",
         tree("root: {python: py_trees.behaviours.Succes}\n"),
         tree("root: {python: py_trees.behaviours.Success}\n"),
     ),
     Rule("BT215", "arguments do not fit",
-        "The arguments do not fit the constructor of the class. The node gives the behaviour's "
-        "name. Where a parameter is annotated with an enum, the argument is the name of a member.",
+        "The arguments do not fit the constructor of the class. The constructor also gets the "
+        "name of the node. For a parameter with an enum as its type, the argument is the name of "
+        "a member.",
         tree("root: {python: py_trees.behaviours.Periodic, arguments: {number: 3}}\n"),
         tree("root: {python: py_trees.behaviours.Periodic, arguments: {n: 3}}\n"),
     ),
     Rule("BT216", "a name is declared twice",
-        "Two things have one name, so that the name has no clear meaning.",
+        "Two declarations have the same name.",
         tree("inputs: {door: bool}\ntopics: {door: {topic: door, type: std_msgs/msg/Bool}}\n"
              "root: {check: $door}\n"),
         tree("topics: {door: {topic: door, type: std_msgs/msg/Bool}}\n"
              "root: {check: $door.data}\n"),
     ),
     Rule("BT217", "one name with two types",
-        "A name of ROS has one type. A tree, with all that it includes, uses this action server, "
-        "service or topic with two: the second could not even be connected. A relative name is "
-        "read as in the namespace /: for a tree in another namespace, 'robot' and '/robot' "
-        "differ, and the tree's own 'namespace' says so.",
+        "An action server, a service or a topic has one type. This tree, with its included trees, "
+        "uses the name with two types, and ROS would not connect the second one. The rule reads a "
+        "relative name in the namespace /. Where 'robot' and '/robot' differ, give the tree its "
+        "'namespace'.",
         tree("root:\n  sequence: S\n  children:\n"
              "    - {publish: said, type: std_msgs/msg/String}\n"
              "    - {publish: said, type: std_msgs/msg/Bool}\n"),

@@ -40,70 +40,75 @@ RESULT = frozenset({"result"})
 TIMEOUT = Record(
     "a duration or a mapping of deadlines",
     keyed(
-        Key("queue", Duration(or_none=True), "For the resource to become free.", default="10 s"),
-        Key("server", Duration(or_none=True), "For a server to be there.", default="5 s"),
-        Key("accept", Duration(or_none=True), "From the goal to its acceptance.", default="5 s"),
-        Key("result", Duration(or_none=True), "From acceptance to the result.", default="none"),
-        Key("feedback", Duration(or_none=True), "The longest silence.", default="none"),
-        Key("cancel", Duration(or_none=True), "From canceling to the end.", default="5 s"),
+        Key("queue", Duration(or_none=True), "The wait for a free resource.", default="10 s"),
+        Key("server", Duration(or_none=True), "The wait for a server in sight.", default="5 s"),
+        Key("accept", Duration(or_none=True), "From the send to the acceptance.", default="5 s"),
+        Key("result", Duration(or_none=True), "From the acceptance to the result.", default="none"),
+        Key(
+            "feedback", Duration(or_none=True), "The longest time without feedback.", default="none"
+        ),
+        Key("cancel", Duration(or_none=True), "From the cancel to the end.", default="5 s"),
     ),
     short="result",
 )
 _TRIES = (
-    Key("attempts", Whole(1), "All tries, the first among them.", default="1"),
+    Key("attempts", Whole(1), "The number of attempts, the first one included.", default="1"),
     Key("backoff", Duration(zero=True), "The pause before the second try.", default="0 s"),
     Key("factor", Quantity(1.0), "Each pause is this much longer.", default="2"),
     Key("max_backoff", Duration(zero=True), "The longest pause.", default="60 s"),
-    Key("jitter", Quantity(0.0, 1.0), "By how much of itself a pause varies.", default="0"),
+    Key("jitter", Quantity(0.0, 1.0), "The share by which a pause varies.", default="0"),
 )
 _OUTCOMES = ListOf(Choice(tuple(sorted(outcome.value for outcome in RETRYABLE))), single=True)
-_WHEN = Key("when", Condition(RESULT), "Try again only if this holds for the result.")
+_WHEN = Key(
+    "when", Condition(RESULT), "Another attempt follows only where this holds for the result."
+)
 RETRY = Record(
     "a number of attempts or a mapping",
-    keyed(*_TRIES, Key("outcomes", _OUTCOMES, "Outcomes that another attempt follows."), _WHEN),
+    keyed(*_TRIES, Key("outcomes", _OUTCOMES, "The outcomes that another attempt follows."), _WHEN),
     short="attempts",
 )
 SERVICE_TIMEOUT = Record(
     "a duration or a mapping of deadlines",
     keyed(
-        Key("server", Duration(or_none=True), "For the service to be there.", default="5 s"),
-        Key("response", Duration(or_none=True), "For the answer.", default="5 s"),
+        Key("server", Duration(or_none=True), "The wait for the service.", default="5 s"),
+        Key("response", Duration(or_none=True), "The wait for the answer.", default="5 s"),
     ),
     short="response",
 )
 SERVICE_RETRY = Record("a number of attempts or a mapping", keyed(*_TRIES, _WHEN), short="attempts")
 NAMESPACE = RosName("a namespace", namespace=True)
 POLICIES = (
-    Key("timeout", TIMEOUT, "How long each phase may take; a bare duration is the result's."),
-    Key("retry", RETRY, "How often to try; a bare number is the attempts."),
-    Key("busy", Choice(tuple(busy.value for busy in Busy)), "The reaction to a taken server.",
-        default="wait"),
+    Key("timeout", TIMEOUT, "How long each phase may take; a bare duration is that of the result."),
+    Key("retry", RETRY, "How often to try; a bare number is the number of attempts."),
+    Key("busy", Choice(tuple(busy.value for busy in Busy)),
+        "What to do when another goal has the server.", default="wait"),
 )  # fmt: skip
 FAILED = frozenset({"result", "outcome"})
 SAVE_ON_FAILURE = Key(
     "save_on_failure", Table(Place(FAILED)),
-    "Names to keep parts of a result under that is none of a success, or the `outcome`.",
+    "Variables for parts of the result after a failure, or for the `outcome`.",
 )  # fmt: skip
 DOING = (
-    Key("goal", Values(), "The fields of the goal; what is not named keeps its default."),
+    Key("goal", Values(), "The fields of the goal; other fields keep their defaults."),
     Key("until", Condition(frozenset({"feedback"})),
-        "Where this holds for the feedback, the goal is canceled, and that is a success."),
+        "A condition on the feedback: when it holds, the leaf cancels the goal and succeeds."),
     Key("on_change", Choice(("ignore", "replace", "cancel")),
         "The reaction to changed fields while the goal executes.",
         default="ignore"),
     *POLICIES,
-    Key("expect", Condition(RESULT), "A condition on the result, beyond the server's word."),
-    Key("save", Table(Place(RESULT)), "Names to keep parts of the result under."),
+    Key("expect", Condition(RESULT),
+        "A condition on the result of a goal that succeeded; else UNEXPECTED_RESULT."),
+    Key("save", Table(Place(RESULT)), "Variables for parts of the result."),
     SAVE_ON_FAILURE,
     Key("resources", ListOf(Text("a text")),
-        "The goal's resources, in place of its server; named as servers are.",
+        "The resources of the goal, in place of its server; relative names as those of servers.",
         default="the server's name"),
     Key("namespace", NAMESPACE, "Put before a relative name of a server or resource."),
 )  # fmt: skip
 GATES = keyed(
-    Key("only_if", Condition(), "Leave the node out where this is false at its begin."),
+    Key("only_if", Condition(), "Leave the node out where this is false at the begin of the node."),
     Key("only_while", Condition(),
-        "Leave the node out where this is false before any tick; what runs is stopped."),
+        "Leave the node out where this is false before a tick, and stop the nodes below."),
 )  # fmt: skip
 """The keys beside every kind."""
 ACTION_KEYS = keyed(*DOING, *GATES.values())
@@ -124,13 +129,18 @@ INPUT = Record(
     "the type of an input",
     keyed(
         _VALUE_TYPE,
-        Key("default", AnyValue(), "The value where none is given; without it one must be."),
+        Key(
+            "default",
+            AnyValue(),
+            "The value where the caller gives none; without a default the caller must give one.",
+        ),
         Key("unit", Text(), "For people."),
         Key("description", Text(), "For people."),
         Key(
             "secret",
             Flag(),
-            "No event, log or parameter tells its value, nor what is computed from it.",
+            "Whether to hide the value, and all values computed from it, from events, log and "
+            "parameters.",
             default="false",
         ),
     ),
@@ -173,12 +183,18 @@ OWN_KIND = Record(
 )  # fmt: skip
 DEFAULTS = Record("a mapping of settings", keyed(*POLICIES))
 _DESCRIPTION = Key("description", Text(), "The tree's purpose.")
-_IMPORT = Key("import", ListOf(Text("a path, as a text"), single=True), "Files with more of these.")
+_IMPORT = Key(
+    "import",
+    ListOf(Text("a path, as a text"), single=True),
+    "Files that declare more actions, topics, kinds and defaults.",
+)
 _SHARED = (
-    Key("actions", Table(ALIAS), "This tree's words for the actions it uses."),
-    Key("topics", Table(TOPIC), "Latest values, read as `$name.field`; missing ones fail a check."),
-    Key("kinds", Table(OWN_KIND), "Kinds of nodes of one's own."),
-    Key("defaults", DEFAULTS, "Settings for all actions that do not say otherwise."),
+    Key("actions", Table(ALIAS), "Short names for the actions of this tree."),
+    Key(
+        "topics", Table(TOPIC), "Topics whose latest messages are variables, read as `$name.field`."
+    ),
+    Key("kinds", Table(OWN_KIND), "Classes of your own as kinds of nodes."),
+    Key("defaults", DEFAULTS, "Settings for all actions without a setting of their own."),
 )
 
 

@@ -185,7 +185,7 @@ class Kind:
         return self.goes_on if self.group is Group.COMPOSITE else None
 
 
-NAME = Key("name", NodeName(), "The node's name, where the kind's value does not say enough.")
+NAME = Key("name", NodeName(), "A name for the node, in place of the value of its kind.")
 _CHILDREN = Key("children", NODES, "The child nodes.", required=True,
                 example="[{success: First}, {success: Second}]")  # fmt: skip
 _CHILD = Key("child", NODE, "The child node.", required=True, example="{success: Done}")

@@ -45,26 +45,26 @@ def _ends(values: Settings, inner: list[Can], at_once: bool) -> Can:
 
 
 _SEMANTICS = """
-| the condition | then |
+| the condition | the node |
 |---|---|
-| is true, or succeeds | ticks `then`, whose status is the node's |
-| is false, or fails | ticks `else`; without one, FAILURE |
-| cannot be computed | FAILURE |
-| RUNNING | RUNNING; nothing is stopped |
+| is true, or succeeds | ticks `then`, and has its status |
+| is false, or fails | ticks `else`, and has its status; without an `else`, FAILURE |
+| has no value | FAILURE |
+| RUNNING | RUNNING, and stops no branch |
 
 A failure of one branch does not begin the other. With `memory: false` the other branch begins when
 the stopped goals have ended.
 """
 KIND = Kind(
     "if", Group.COMPOSITE, ConditionOrNode(),
-    "Ticks `then` or `else`, by a condition, and ends as that branch does. The condition is an "
-    "expression, or a node that succeeds or fails.",
+    "Ticks `then` or `else`, as a condition decides, and ends as that branch does. The condition "
+    "is an expression, or a node that succeeds or fails.",
     keyed(
         Key("then", NODE, "The node for a true condition.", required=True, example="{success: Go}"),
         Key("else", NODE, "The node for a false condition.", default="fails"),
         Key("memory", Flag(), default="true",
-            doc="Whether the choice is kept until the node ends; false asks before each tick, and "
-            "stops what is not chosen any more."),
+            doc="Whether the node keeps its choice to its end; with false the node decides before "
+            "each tick, and stops the other branch."),
         NAME,
     ),
     "if: $level > 0.2\nthen:\n  success: Work\nelse:\n  success: Charge",

@@ -18,7 +18,7 @@ from bt_actions.document.yaml.nodes import span_of
 def _memory(more: str = "", word: str = "") -> Key:
     return Key(
         "memory", Flag(word=word), default="true",
-        doc="Whether a child that has finished is left alone; false makes the node "
+        doc="Whether a visit ticks a finished child only once; false makes the node "
         f"reactive.{more}",
     )  # fmt: skip
 
@@ -61,37 +61,40 @@ def _all_fail(values: Settings, inner: list[Can], at_once: bool) -> Can:
 
 
 _TURNS = """
-With `in_turn: true` a visit begins behind the child that has succeeded last, tries each child once,
-and goes on from the last to the first:
+With `in_turn: true` a visit begins after the child that has succeeded last. The visit tries each
+child once, and goes on from the last child to the first:
 
 | child | the node |
 |---|---|
-| SUCCESS | SUCCESS; the next visit begins behind this child |
-| FAILURE | tries the next child; after the last, FAILURE, and a visit begins at the first |
+| SUCCESS | SUCCESS; the next visit begins after this child |
+| FAILURE | tries the next child; when all have failed: FAILURE, and the next visit begins with \
+the first child |
 | RUNNING | RUNNING |
-| stopped | the next visit begins at the first child |
+| stopped | the next visit begins with the first child |
 
-The place outlasts the end of a visit, as long as the tree is loaded.
+The node keeps its place from visit to visit, as long as the tree is loaded.
 """
 _RESUMES = """
-With `memory: resume` a visit that follows a failure, or a stop, begins with the child that failed
-or was stopped; after a success, with the first. Children that have finished are left alone.
+With `memory: resume` a visit after a failure, or after a stop, begins with the child that failed or
+was stopped. A visit after a success begins with the first child.
 """
 KINDS = (
     composite(
         "sequence",
-        "Ticks its children in order until one fails; succeeds when all have.",
+        "Ticks its children in order; fails when a child fails, and succeeds when all have "
+        "succeeded.",
         "sequence: Fetch\nchildren:\n  - success: Go\n  - success: Grasp",
-        _memory(" resume goes on where the last visit failed.", "resume"),
+        _memory(" resume begins where the last visit failed.", "resume"),
         build=_sequence, ends=all_succeed, goes_on=End.SUCCESS, semantics=_RESUMES,
         seconds=lambda _values, inner: sum(inner),
     ),
     composite(
         "fallback",
-        "Ticks its children in order until one succeeds; fails when all have.",
+        "Ticks its children in order; succeeds when a child succeeds, and fails when all have "
+        "failed.",
         "fallback: Try both ways\nchildren:\n  - failure: Left\n  - success: Right",
         _memory(),
-        Key("in_turn", Flag(), "Whether a visit begins behind the child that has succeeded last.",
+        Key("in_turn", Flag(), "Whether a visit begins after the child that has succeeded last.",
             default="false"),
         build=_fallback, check=_check_turns, ends=_all_fail, goes_on=End.FAILURE,
         semantics=_TURNS, seconds=lambda _values, inner: sum(inner),

@@ -80,15 +80,16 @@ def _ends(values: Settings, inner: list[Can], _at_once: bool) -> Can:
 
 
 _SEMANTICS = """
-`policy: {at_least: 2, fails_after: 1}` succeeds when two children have, and fails with the first
-that fails. Without `fails_after` the node fails when too few can succeed any more.
+`policy: {at_least: 2, fails_after: 1}` succeeds with the second success, and fails with the first
+failure. Without `fails_after` the node fails when too few children can still succeed.
 """
 KIND = composite(
     "parallel",
-    "Ticks its children side by side. A child that has finished is not started again; no child "
-    "begins once the node has succeeded or failed, which is decided after each child.",
+    "Ticks its children side by side, each to its end. The node decides after each child "
+    "whether it has succeeded or failed, and then begins no further child.",
     "parallel: Look and listen\nchildren:\n  - success: Look\n  - success: Listen",
-    Key("policy", _POLICY, "How many must succeed; the rest is then stopped.", default="all"),
+    Key("policy", _POLICY, "How many children must succeed; the node then stops the others.",
+        default="all"),
     build=_build, check=_check, warn=warn_of_resources, ends=_ends, again=End.ANY,
     semantics=_SEMANTICS,
 )  # fmt: skip

@@ -47,17 +47,17 @@ def _unpaced(children: Sequence[TreeNode]) -> list[TreeNode]:
 _SEMANTICS = """
 | a child | the node |
 |---|---|
-| RUNNING, at the farthest place that was reached or behind it | RUNNING; no later child is ticked |
-| RUNNING, before that place | ticks the next child |
-| SUCCESS | ticks the next child; the last: SUCCESS, and running children are stopped |
-| FAILURE | FAILURE, and running children are stopped |
+| RUNNING, and no later child has begun in this visit | RUNNING; ticks no later child |
+| RUNNING, and a later child has begun | ticks the next child |
+| SUCCESS | ticks the next child; after the last: SUCCESS, and stops running children |
+| FAILURE | FAILURE, and stops running children |
 
-Children that have succeeded begin again at the next tick, as long as a later one runs: `every` says
-how often. A new visit begins at the first place.
+A child that has succeeded begins again at the next tick, as long as a later child runs; `every`
+sets the pace. A new visit begins with the first child.
 """
 KIND = composite(
     "pipeline",
-    "Ticks its children in order; those that have succeeded again, while a later child runs.",
+    "Ticks its children in order; while a later child runs, earlier children begin again.",
     "pipeline: Follow\nchildren:\n  - every: 1 s\n    child:\n      success: Plan\n"
     "  - success: Follow the plan",
     build=_build, warn=_warn, ends=all_succeed, goes_on=End.SUCCESS, again=End.ANY,

@@ -29,17 +29,18 @@ def _warn(hazards: Hazards, node: TreeNode, _bounded: bool) -> None:
 _SEMANTICS = """
 | when | the node |
 |---|---|
-| begins | ticks its child at once; SUCCESS and FAILURE are the node's |
-| comes sooner than that after its child's last success | RUNNING, and the child is left |
-| its child runs | ticks it on |
-| has failed, or is stopped | forgets when its child succeeded |
+| a visit begins, and the period has passed, or the child has not succeeded yet | ticks its child, \
+and has its status |
+| a visit begins within the period | RUNNING, without a tick of the child |
+| the child runs | ticks its child |
+| the node has failed, or was stopped | forgets the last success |
 
-With `every: none` the child succeeds once until the node has failed, or is stopped: in a
+With `every: none` the child succeeds once, until the node has failed or was stopped: in a
 `pipeline`, once in a visit.
 """
 KIND = decorator(
     "every",
-    "Begins its child at once, and again so long after the child's last success.",
+    "Begins its child at once, and again when a period has passed since the child's last success.",
     "every: 1 s\nchild:\n  success: Plan",
     value=Duration(or_none=True),
     build=_build, warn=_warn, slow=True, goes_on=End.SUCCESS, semantics=_SEMANTICS, paces=True,

@@ -76,7 +76,7 @@ KIND = decorator(
     Key("as", Name(), "The variable that holds the item.", default="item"),
     Key("index", Name(), "A variable that counts the items, from 0."),
     Key("on_failure", Choice(("stop", "continue")),
-        "Whether to go on when an item fails; the node then succeeds if any item did.",
+        "Whether to go on when an item fails; with continue the node succeeds if any item did.",
         default="stop"),
     build=_build, check=_check, ends=_ends, seconds=_seconds, writes=_writes,
     slow=True, again=End.ANY,

@@ -16,13 +16,13 @@ def _build(node: TreeNode, context: Context, child: Behaviour) -> Behaviour:
 KINDS = (
     decorator(
         "force_success",
-        "Succeeds when its child has finished, however.",
+        "Succeeds when its child has ended, with SUCCESS or FAILURE.",
         "force_success: If possible\nchild:\n  failure: Wave",
         build=_build, ends=lambda _values, inner, _: Can(any(inner[0]), False), goes_on=End.ANY,
     ),
     decorator(
         "force_failure",
-        "Fails when its child has finished, however.",
+        "Fails when its child has ended, with SUCCESS or FAILURE.",
         "force_failure: Give up\nchild:\n  success: Go home",
         build=_build, ends=lambda _values, inner, _: Can(False, any(inner[0])),
     ),

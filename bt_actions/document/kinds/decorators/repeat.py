@@ -41,7 +41,7 @@ _SEMANTICS = """
 |---|---|
 | FAILURE | FAILURE |
 | SUCCESS, and `until` is true | SUCCESS |
-| SUCCESS, and `until` cannot be computed | FAILURE |
+| SUCCESS, and `until` has no value | FAILURE |
 | SUCCESS in the last of `times` | SUCCESS; with `until`, FAILURE |
 | SUCCESS | RUNNING; the next round begins at the next tick, which comes at once |
 """
@@ -49,8 +49,9 @@ KIND = decorator(
     "repeat",
     "Ticks its child again after each success; fails with the first failure.",
     "repeat: Three rounds\ntimes: 3\nchild:\n  success: Patrol",
-    Key("times", Whole(0, values=True), "All rounds.", default="for ever", example="3"),
-    Key("until", Condition(), "Asked after each round that has succeeded: true succeeds."),
+    Key("times", Whole(0, values=True), "The number of rounds.", default="for ever", example="3"),
+    Key("until", Condition(),
+        "A condition after each round that has succeeded: true ends the node with SUCCESS."),
     build=_build, check=_check, semantics=_SEMANTICS,
     ends=_ends, seconds=_seconds, slow=True, again=End.SUCCESS,
 )  # fmt: skip

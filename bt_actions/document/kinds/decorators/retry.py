@@ -33,8 +33,8 @@ def _check(checker: Checker, node: TreeNode) -> None:
     if "recover" in node.written and node.values.get("attempts") == 1:
         checker.source.report(
             "BT110", span_of(node.written["attempts"]),
-            "nothing recovers from the last attempt, and there is but one",
-            hint="attempts: 2 and more, the first among them",
+            "'recover' never runs: no attempt follows the only one",
+            hint="attempts: 2, or more; the first attempt counts",
         )  # fmt: skip
 
 
@@ -68,8 +68,9 @@ With `recover`:
 
 | | `child` | `recover` |
 |---|---|---|
-| SUCCESS | SUCCESS | the next attempt, in the same tick where there is no pause, and a limit |
-| FAILURE | of the last attempt: FAILURE; else `recover`, in the same tick | FAILURE |
+| SUCCESS | SUCCESS | the next attempt; in the same tick, where `attempts` is set and no pause \
+is due |
+| FAILURE | `recover`, in the same tick; after the last attempt FAILURE | FAILURE |
 | RUNNING | RUNNING | RUNNING |
 | stopped | attempts begin at 1 | attempts begin at 1 |
 """
@@ -77,11 +78,12 @@ KIND = decorator(
     "retry",
     "Ticks its child again after a failure.",
     "retry: Until it holds\nattempts: 3\nbackoff: 500 ms\nchild:\n  success: Grasp",
-    Key("attempts", Whole(1, values=True), "All tries.", default="without limit", example="3"),
+    Key("attempts", Whole(1, values=True), "The number of attempts.", default="without limit",
+        example="3"),
     Key("backoff", Duration(zero=True), "The pause before the second try.", default="0 s"),
     Key("factor", Quantity(1.0), "Each pause is this much longer.", default="2"),
     Key("max_backoff", Duration(zero=True), "The longest pause.", default="60 s"),
-    Key("recover", NODE, "A node for each failure but the last, before the pause."),
+    Key("recover", NODE, "A node to run after each failure except the last, before the pause."),
     build=_build, check=_check, warn=_warn, ends=_ends, seconds=_seconds, slow=True,
     again=End.FAILURE, semantics=_SEMANTICS,
 )  # fmt: skip

@@ -13,7 +13,7 @@ def _build(node: TreeNode, context: Context, child: Behaviour) -> Behaviour:
 
 KIND = decorator(
     "run_once",
-    "Runs its child to an end once, and keeps that end.",
+    "Runs its child to an end once, and repeats that status in later visits.",
     "run_once: Calibrate first\nchild:\n  success: Calibrate",
     build=_build, goes_on=End.SUCCESS, once=True,
     ends=lambda _values, inner, at_once: EITHER if at_once else inner[0],

@@ -19,8 +19,8 @@ def _warn(hazards: Hazards, node: TreeNode, _bounded: bool) -> None:
     if after < needed:
         hazards.source.report(
             "BT307", span_of(node.written["after"]),
-            f"{after:g} s are less than the {needed:g} s that what it holds may take",
-            hint="the deadlines and retries inside would never be reached",
+            f"{after:g} s are less than the {needed:g} s that the nodes inside may take",
+            hint="the deadlines and retries inside would never have an effect",
         )  # fmt: skip
 
 
@@ -31,8 +31,8 @@ def _seconds(values: Settings, inner: list[float]) -> float:
 
 KIND = decorator(
     "timeout",
-    "Stops its child after some time, and fails once the stopped goals have ended, or have not "
-    "ended within their own 'cancel'.",
+    "Stops its child after some time. The node then fails when the stopped goals have ended, or "
+    "when their own 'cancel' deadlines have passed.",
     "timeout: Ten seconds at most\nafter: 10 s\nchild:\n  success: Search",
     Key("after", Duration(values=True), "How long the child may take.", required=True,
         example="10 s"),

@@ -22,8 +22,8 @@ def _build(node: TreeNode, context: Context, child: Behaviour) -> Behaviour:
 
 KIND = decorator(
     "while",
-    "Ticks its child as long as the expression is true, which is asked before each tick; else "
-    "stops the child and fails.",
+    "Ticks its child as long as the expression is true; otherwise stops the child and fails. The "
+    "node computes the expression before each tick.",
     "while: $level > 0.2\nchild:\n  success: Work",
     value=Condition(),
     build=_build, ends=lambda _values, inner, _at_once: Can(inner[0].succeed, True),

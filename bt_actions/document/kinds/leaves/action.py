@@ -38,7 +38,7 @@ _OWN = ("goal", *SAVES, *GATES)
 KIND = leaf(
     "action",
     NodeName(),
-    "Sends a goal to an action; the same as a name under `actions`, with type and server here.",
+    "Sends a goal to an action; as a name under `actions`, but with type and server in the node.",
     "action: To the part\ntype: robot_control_interfaces/action/MoveRobot\n"
     "server: move_robot\ngoal: {distance: 2.0}\ntimeout: 30 s",
     ACTION_TYPE, ACTION_NAME, *DOING, interface=ACTION, build=_build, begun=True,

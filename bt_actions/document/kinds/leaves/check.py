@@ -16,7 +16,7 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
 KIND = leaf(
     "check",
     Condition(),
-    "Succeeds when the expression is true, and fails when it is not or cannot be computed.",
+    "Succeeds when the expression is true, and fails when it is false or has no value.",
     "check: $level > 0.2",
     build=_build,
 )

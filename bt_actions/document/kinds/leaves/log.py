@@ -20,7 +20,7 @@ def _check(checker: Checker, node: TreeNode) -> None:
 KIND = leaf(
     "log",
     Text(values=True),
-    "Writes a line to the log, and never fails: `(no value)` stands for a missing value.",
+    "Writes a line to the log, and never fails: `(no value)` replaces a missing value.",
     "log: The level is $(level)\nlevel: warn",
     Key("level", Choice(("debug", "info", "warn", "error", "fatal")), "The severity.",
         default="info"),

@@ -41,15 +41,15 @@ def _ends(values: Settings, _inner: list[Can], at_once: bool) -> Can:
 KIND = leaf(
     "publish",
     TOPIC_NAME,
-    "Publishes a message. In a new process (3.5 s) subscribers may not be discovered yet, so "
-    "the node waits for one until then; without a subscriber it succeeds with a warning.",
+    "Publishes a message. In the first 3.5 s of a process the node waits for a subscriber, as "
+    "discovery takes time. Without a subscriber the node succeeds with a warning.",
     "publish: lamp\ntype: std_msgs/msg/Bool\nmessage: {data: true}",
     MESSAGE_TYPE,
     Key("message", Values(), "The fields of the message."),
     Key("subscribers", Whole(1), "The number of subscribers that the node waits for.",
         default="any number"),
     Key("timeout", Duration(or_none=True), default="none",
-        doc="The wait for subscribers, then FAILURE; not while a process is new."),
+        doc="The wait for subscribers, then FAILURE; at least the first 3.5 s of the process."),
     Key("qos", QOS, "The quality of service of the publisher.", default="default"),
     Key("namespace", NAMESPACE, "Put before a relative name."),
     interface=Interface("msg", "publish", "message"),

@@ -66,8 +66,8 @@ def _check(checker: Checker, node: TreeNode) -> None:
 KIND = leaf(
     "python",
     Text("a class, such as package.module.Class, as a text"),
-    "A behaviour of one's own, made with its name and `arguments`.",
+    "A behaviour of your own, made with its name and `arguments`.",
     "python: py_trees.behaviours.Periodic\narguments: {n: 3}",
-    Key("arguments", Values(), "For its constructor; of an enum, a member's name."),
+    Key("arguments", Values(), "Arguments of the constructor; for an enum, a member's name."),
     build=_build, check=_check, slow=True,
 )  # fmt: skip

@@ -37,19 +37,19 @@ def _check(checker: Checker, node: TreeNode) -> None:
 KIND = leaf(
     "run_tree",
     NodeName(),
-    "Lets a server of trees (`bt-actions serve`) run a tree, and takes over the end of that "
-    "run: a goal there that is not accounted for leaves the end UNKNOWN here.",
+    "Lets a server of trees (`bt-actions serve`) run a tree, and ends as that run does. Where a "
+    "goal of that run is not accounted for, the end of this goal is UNKNOWN.",
     "run_tree: Fetch the part\ntree: fetch\nserver: /r1/run_tree\ninputs: {pick_at: 2.0}\n"
     "save: {at: outputs.at}",
     Key("tree", Text(values=True), "The tree's name at that server.", required=True,
         example="fetch"),
     Key("server", ACTION_SERVER, "The server's action.", default="run_tree"),
     Key("inputs", Values(), "Values for the tree's inputs."),
-    Key("timeout", TIMEOUT, "As for an action, but `cancel` is 15 s where nothing is said: "
-        "the run sees its own goals to their ends first."),
+    Key("timeout", TIMEOUT, "As for an action, but with a default of 15 s for `cancel`: "
+        "the run below drains its goals first."),
     *POLICIES[1:],
     Key("expect", Condition(_RUN), "A condition on `result`, or on `outputs`."),
-    Key("save", Table(Place(_RUN)), "Names to keep parts of the outputs under."),
+    Key("save", Table(Place(_RUN)), "Variables for parts of the outputs."),
     *DOING[-2:],
     reads="inputs",
     interface=Interface(

@@ -29,15 +29,15 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
 KIND = leaf(
     "wait_for_message",
     NodeName(),
-    "Succeeds with the first message since its begin that fits.",
+    "Succeeds with the first message after its begin that meets the condition.",
     "wait_for_message: The door opens\ntopic: door\ntype: std_msgs/msg/Bool\n"
     "until: message.data\ntimeout: 60 s",
     Key("topic", TOPIC_NAME, "The topic.", required=True, example="door"),
     MESSAGE_TYPE,
     Key("until", Condition(_MESSAGE), "A condition on the message.", default="any message"),
     Key("timeout", Duration(or_none=True), "The time after which the node fails.", default="none"),
-    Key("save", Table(Place(_MESSAGE)), "Names to keep parts of the message under."),
-    Key("qos", QOS, "How the topic is subscribed to.", default="default"),
+    Key("save", Table(Place(_MESSAGE)), "Variables for parts of the message."),
+    Key("qos", QOS, "The quality of service of the subscription.", default="default"),
     Key("namespace", NAMESPACE, "Put before a relative name."),
     interface=Interface("msg", "topic", root="message"), build=_build, begun=True,
 )  # fmt: skip
