@@ -68,13 +68,13 @@ class TopicValue(Connected[Subscription]):
 
     def _latest(self) -> object:
         if self._backend is None:
-            raise ExpressionError(f"nothing has come on {self._given[1]} yet (${self.name})")
+            raise ExpressionError(f"no message has come on {self._given[1]} yet (${self.name})")
         topic = self._own.name
         if self._newest is None:
             now = self._backend.now().steady
             if now >= self._look_again_at:  # a tree may ask at each tick
                 self._said, self._look_again_at = self._own.why_nobody(), now + 1.0
-            raise ExpressionError(f"nothing has come on {topic} yet (${self.name}){self._said}")
+            raise ExpressionError(f"no message has come on {topic} yet (${self.name}){self._said}")
         message, since = self._newest
         age = since.passed()
         if self._max_age is not None and age > self._max_age:
@@ -235,7 +235,7 @@ class Publish(Connected[Publisher], Limited):
                     f"{listeners} of {self._subscribers} subscribers listen on {topic} after"
                     f" {self._timeout:g} s{publisher.why_nobody()}"
                 )
-            self.feedback_message = f"waiting for a listener on {topic}"
+            self.feedback_message = f"waiting for a subscriber of {topic}"
             return Status.RUNNING
         publisher.publish(fill(self._type, self._data(), now=backend.stamp))
         why = "" if listeners else f"nobody listens on {topic}{publisher.why_nobody()}"

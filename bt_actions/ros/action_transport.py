@@ -200,7 +200,7 @@ class RosTransport:
                 try:
                     tell(*what)
                 except Exception as error:  # noqa: BLE001 - the others still want to hear
-                    log.error(f"{self._name}: what came was not taken in: {raised(error)}")
+                    log.error(f"{self._name}: a message could not be processed: {raised(error)}")
             if any_came:
                 with contextlib.suppress(Exception):  # nothing was lost by that
                     self._listener.all_delivered()

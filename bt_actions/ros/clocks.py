@@ -58,6 +58,6 @@ class Clocks:
         if steady > self._warn_at:
             self._warn_at = math.inf
             log.warning(
-                f"use_sim_time is set, and nothing has come on /clock for {MOMENT:g} s: until then "
-                "no time passes for what waits by it; is the simulator there, and not paused?"
+                f"use_sim_time is set, and no message has come on /clock for {MOMENT:g} s: time "
+                "does not pass for waiting nodes before the first one; does the simulator run?"
             )

@@ -110,7 +110,7 @@ class Receiver:
             try:
                 each.take_data()
             except Exception as error:  # noqa: BLE001 - the others still want to hear
-                log.error(f"what came for an action was not taken in: {raised(error)}")
+                log.error(f"a message of an action server could not be processed: {raised(error)}")
         return ready
 
 

@@ -53,7 +53,7 @@ def test_a_goal_that_may_be_running_counts_more_than_an_output_that_is_lost(
     monkeypatch.setattr(sys, "stdout", Unwritable(error))
     lost = {errno.ENOSPC: 2, errno.EPIPE: 141}[error]
     assert main(["cleanup"]) == (3 if end is End.UNKNOWN else lost)
-    said = "not all of them have ended" in capsys.readouterr().err
+    said = "not all of these goals have ended" in capsys.readouterr().err
     assert said is (end is End.UNKNOWN)
 
 
@@ -65,7 +65,7 @@ def test_where_no_server_is_in_sight_nobody_says_that_nothing_is_left(
     monkeypatch.setattr(Cleanup, "run", lambda _: Swept([], in_sight, {}, 7, None, [], {}))
     assert main(["cleanup"]) == 3
     said = capsys.readouterr()
-    assert "no action is in sight in ROS domain 7" in said.err
+    assert "no action server is in sight in ROS domain 7" in said.err
     assert not said.out
     assert sweep(0.1, 0.1, wanted=()) == 0, "a tree without actions is in nobody's way"
     assert capsys.readouterr().out
@@ -94,7 +94,7 @@ def test_what_nobody_wants_is_not_counted_where_it_is_silent(
     monkeypatch.setattr(Cleanup, "run", lambda _: Swept([], ["/a"], silent, 7, None, [], {}))
     assert sweep(0.1, 0.1, wanted=["/a"]) == 0
     said = capsys.readouterr()
-    assert said.err == "no server of /b answers: nobody can see what was left there\n"
+    assert said.err == "no server of /b answers: nobody can see the goals there\n"
     assert said.out == ("nothing is left to cancel on the 1 action of 2 in sight in ROS domain 7\n")
 
 
@@ -105,7 +105,7 @@ def test_where_the_records_cannot_be_read_nobody_says_that_nothing_is_left(
     monkeypatch.setattr(Cleanup, "run", lambda _: Swept([], ["/a"], {}, 7, trouble, [], {}))
     assert main(["cleanup"]) == 3
     said = capsys.readouterr()
-    assert "nobody can see what was sent and not answered" in said.err
+    assert "nobody can see the goals without an answer" in said.err
     assert "/records" in said.err
     assert said.out == ""
 
@@ -123,9 +123,7 @@ def test_an_action_that_is_named_is_wanted(
     monkeypatch.setattr(Cleanup, "run", run)
     assert main(["cleanup", "/r1/move"]) == 3
     said = capsys.readouterr()
-    assert said.err == (
-        "no server of /r1/move answers: nobody can see what was left there; start it\n"
-    )
+    assert said.err == ("no server of /r1/move answers: nobody can see the goals there; start it\n")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
@@ -134,7 +132,7 @@ def test_a_signal_ends_it_and_it_says_so(start: Start, node: Any, number: signal
     until(lambda: "bt_actions_cleanup" in node.get_node_names(), within=20.0)
     cleanup.send(number)
     assert cleanup.wait() == 128 + number, cleanup
-    assert cleanup.errors == [f"stopped by {number.name} before all was seen"]
+    assert cleanup.errors == [f"stopped by {number.name} before all servers had answered"]
 
 
 def test_a_signal_while_a_goal_runs_that_was_found(

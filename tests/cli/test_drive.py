@@ -361,5 +361,5 @@ def test_a_view_that_fails_is_given_up_and_the_run_goes_on(
     assert run.go() is Exit.FAILURE, "a success that nobody could be told is none"
     assert run.state.status is Status.SUCCESS
     said = capsys.readouterr().err
-    assert said.count("nothing more can be shown") == 1
+    assert said.count("the output cannot be written") == 1
     assert "No space left on device" in said

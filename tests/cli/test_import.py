@@ -33,7 +33,7 @@ def test_what_is_refused_is_told_and_is_the_exit_code(
 ) -> None:
     assert run(tmp_path, "<ParallelAll><AlwaysSuccess/></ParallelAll>") == 1
     out, _ = capsys.readouterr()
-    assert out.startswith(f"{tmp_path / 'main.xml'}:3:1: node ParallelAll: refused: every child")
+    assert out.startswith(f"{tmp_path / 'main.xml'}:3:1: node ParallelAll: refused: all children")
     assert "AlwaysSuccess: converted" not in out
 
 
@@ -52,7 +52,7 @@ def test_classes_that_were_written_meanwhile_stay(
     capsys.readouterr()
     assert run(tmp_path, "<OpenDoor/><CloseDoor/>") == 0
     assert classes.read_text(encoding="utf-8") == "# written\n"
-    assert "leaves_to_write.py is there, and stays" in capsys.readouterr().err
+    assert "leaves_to_write.py exists, and stays as it is" in capsys.readouterr().err
     assert "CloseDoor" in (tmp_path / "trees" / "Main.yaml").read_text(encoding="utf-8")
 
 

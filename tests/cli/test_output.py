@@ -51,8 +51,8 @@ def test_a_run_whose_result_is_lost_is_no_success(domain: int) -> None:
     done = call(f">{FULL}", *DEMO, "--json")
     assert done.returncode == 1
     lost, ended = done.stderr.splitlines()
-    assert lost.startswith("bt-actions: nothing more can be shown, and the run goes on: ")
-    assert ended == "bt-actions: the tree has succeeded; exit code 1, as that could not be shown"
+    assert lost.startswith("bt-actions: the output cannot be written, and the run goes on: ")
+    assert ended == "bt-actions: exit code 1: the tree has succeeded, but its output is lost"
     assert "Traceback" not in done.stderr
 
 

@@ -258,7 +258,7 @@ class TestReport:
             (["nobody"], "no recorded run has an id or a tree 'nobody'"),
             (["delivr"], "did you mean 'deliver'?"),
             (["nowhere/run.mcap"], "nowhere/run.mcap is no recording"),
-            (["-o", "x.txt"], "a report is written as .md, .json or .html"),
+            (["-o", "x.txt"], "the name of a report ends in .md, .json or .html"),
             (["-o", "nowhere/x.md"], "nowhere/x.md cannot be written: No such file"),
         ],
     )

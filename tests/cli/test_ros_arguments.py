@@ -118,7 +118,7 @@ def test_a_file_that_has_nothing_for_the_node_is_told_with_its_nodes(
     said = capfd.readouterr()
     assert "used: 1.0" in said.out
     first, second = said.err.splitlines()
-    node = "gives nothing to this node, /r1/bt_actions_keyed"
+    node = "has nothing for this node, /r1/bt_actions_keyed"
     assert first.endswith(f"{node}; without the name it does: -p speed:=0.3")
     assert second.endswith(f"{node}; it is for /bt_actions_keyed")
 

@@ -193,7 +193,7 @@ class TestExitCode1:
         journal = robot(speed=20.0, battery=False)
         run = start("run", "trees/pick_and_place.yaml", "--namespace", namespace)
         assert run.wait() == 1, run
-        silent = f"nothing has come on {namespace}/battery_state yet ($battery)"
+        silent = f"no message has come on {namespace}/battery_state yet ($battery)"
         assert why(run)[:3] == [
             "Deliver the part / Pick and place / Know the charge",
             f"  failed: not within 5 s: {silent}",

@@ -105,7 +105,7 @@ def test_a_condition_whose_topic_is_silent_fails_and_chooses_nothing(
     root = load(f"{HEAD}  if: $near.data\n  then: {{success: A}}\n  else: {{success: B}}\n")
     runner = VirtualRunner(root, network)
     assert runner.run() is Status.FAILURE
-    assert root.feedback_message.startswith("nothing has come on /near yet ($near)")
+    assert root.feedback_message.startswith("no message has come on /near yet ($near)")
 
 
 def test_a_goal_that_is_left_out_ends_before_its_parent_goes_on(
@@ -163,7 +163,7 @@ def test_a_gate_waits_for_a_first_message_and_then_fails_with_what_to_ask(
     runner.start()
     assert runner.advance(0.5) is None
     assert runner.run() is Status.FAILURE
-    assert root.feedback_message.startswith("only_if: nothing has come on /near yet")
+    assert root.feedback_message.startswith("only_if: no message has come on /near yet")
     assert root.feedback_message.endswith("; 'known($near)' asks whether it has a value")
 
 

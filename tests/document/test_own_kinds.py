@@ -72,7 +72,7 @@ def test_an_input_without_a_value_fails_the_node(load: Load) -> None:
     topics = "topics: {near: {topic: near, type: std_msgs/msg/Float64}}\n"
     root = load(TREE + topics + "root: {multiply: D, with: {x: $near.data}, save: {b: product}}\n")
     assert tick(root) is Status.FAILURE
-    assert root.feedback_message.startswith("nothing has come on near yet")
+    assert root.feedback_message.startswith("no message has come on near yet")
     assert tree_outputs(root) == {}
 
 

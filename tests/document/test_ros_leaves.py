@@ -196,7 +196,7 @@ def test_a_topic_of_the_same_type_in_another_namespace_is_told(
     root = run(load(TOPICS.format(topic=f"{name}/door", more="", root="check: $door.data")))
     node.destroy_publisher(publisher)
     assert root.feedback_message == (
-        f"nothing has come on {name}/door yet ($door): nobody publishes on it; there is"
+        f"no message has come on {name}/door yet ($door): nobody publishes on it; there is"
         f" {name}/left/door of that type"
     )
 

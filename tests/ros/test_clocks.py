@@ -25,4 +25,4 @@ def test_simulated_time_that_nobody_publishes_is_told_once_after_a_moment(
         steady[0] += clocks.MOMENT
         read.now()
     assert len(said) == 1
-    assert "nothing has come on /clock" in said[0]
+    assert "no message has come on /clock" in said[0]

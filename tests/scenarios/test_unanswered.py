@@ -66,7 +66,7 @@ def test_cleanup_awaits_what_its_server_has_not_accepted_yet(
     assert journal.ends() == ["canceled"]
     canceled_at_once(journal)
     assert [line.split()[-1] for line in cleanup.lines] == ["CANCELED"], cleanup
-    assert "that was not answered: waiting for 30 s" in "\n".join(cleanup.errors), cleanup
+    assert ", without an answer: waiting for 30 s" in "\n".join(cleanup.errors), cleanup
     again = launch("cleanup")
     assert again.wait() == 0, again
     assert "nothing is left" in "\n".join(again.lines), again

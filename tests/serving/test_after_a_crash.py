@@ -73,7 +73,7 @@ def test_where_nobody_can_see_what_was_left_no_goal_is_accepted_and_it_is_said_w
     assert not again.lines
     said = "\n".join(again.errors)
     assert f"{name}" in said
-    assert "nobody can see what was left there; start it, or remove /" in said
+    assert "nobody can see the goals there; start it, or remove /" in said
     assert again.errors[-1].endswith("accepts no goals before that is settled")
 
 

@@ -83,7 +83,7 @@ def test_a_topic_on_which_nothing_comes_fails_at_once_and_tells_why(
     network.publisher(kind, topic)
     root = tree(tmp_path, LISTENS.format(qos="default"))
     assert VirtualRunner(root, network).run() is Status.FAILURE
-    assert root.feedback_message == f"nothing has come on /house/level yet ($level): {why}"
+    assert root.feedback_message == f"no message has come on /house/level yet ($level): {why}"
     assert network.now() == 0.0
 
 

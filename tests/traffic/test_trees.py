@@ -201,7 +201,7 @@ SAYS = "root: {publish: NAME/said, type: std_msgs/msg/String, message: {data: he
 TELLS = {
     "a topic on which nobody publishes": (
         FLAG + "check: $flag.data == 1",
-        "nothing has come on NAME/flag yet ($flag): nobody publishes on it",
+        "no message has come on NAME/flag yet ($flag): nobody publishes on it",
     ),
     "a message before it is waited for": (
         WAITS.replace("QOS", "default"),

@@ -97,8 +97,8 @@ _SHARED: dict[str, dict[str, Any]] = {
     "--no-python": {
         "dest": "python",
         "action": "store_false",
-        "help": "refuse a tree with python: nodes, and import no class for it; for trees that are "
-        "not trusted",
+        "help": "for trees that you do not trust: refuse python: nodes, and import no class of "
+        "the tree",
     },
     "--executor": {
         "choices": ("multi", "single"),
@@ -109,21 +109,21 @@ _SHARED: dict[str, dict[str, Any]] = {
     "--timeout": {
         "metavar": "S",
         "type": seconds,
-        "help": "cancel after so many seconds, exit code 124",
+        "help": "cancel after S seconds, with exit code 124",
     },
     "--json": {"action": "store_true", "help": "print one JSON object a line, the result last"},
     "--quiet": {
         "action": "store_true",
-        "help": "show only failures; the exit code tells the end",
+        "help": "show only failures; the exit code has the end",
     },
     "--publish-values": {
         "action": "store_true",
         "help": "publish goals, results, feedback, variables, inputs and outputs on ~/events and "
-        "~/tree, too; secrets never. Whoever is in the ROS domain can read them",
+        "~/tree, too, for everybody in the ROS domain; never secrets",
     },
     "--fault": {"metavar": "SPEC", "type": fault, "action": "append", "default": []},
     "--speed": {"metavar": "N", "type": speed},
-    "--seed": {"metavar": "N", "type": int, "help": "seed of faults that happen by chance"},
+    "--seed": {"metavar": "N", "type": int, "help": "seed for faults by chance"},
 }
 _SHORT = {"--quiet": "-q"}
 

@@ -55,7 +55,7 @@ def parameters(words: Sequence[str], name: str, namespace: str = "") -> Given | 
         instead = f"without the name it does: {option} {word.partition(':')[2]}"
         if option == FILE:
             instead = f"it is for {listing(_nodes_in(Path(word))) or 'nobody'}"
-        note(f"bt-actions: {option} {word} gives nothing to this node, {given.node}; {instead}")
+        note(f"bt-actions: {option} {word} has nothing for this node, {given.node}; {instead}")
     return given
 
 

@@ -31,10 +31,10 @@ examples:
   bt-actions call pick_and_place --set place_at=4.5 --namespace /r1 --timeout 60
   bt-actions call patrol --server /r2/run_tree --json
 
-`bt-actions list` shows which trees there are. Ctrl-C cancels the run and waits for its end. Exit
-codes are those of `run`: 2 where the server knows no such tree or refuses its inputs, 3 where it
-does not account for every goal of the run, and 1 also where it is busy, is not in sight within 5 s,
-or goes away meanwhile: then the next `serve` there cancels what it left.
+`bt-actions list` lists the trees. Ctrl-C cancels the run and waits for its end. The exit codes are
+those of `run`, and besides: 2 where the server has no such tree, or refuses its inputs; 3 where a
+goal of the run is not accounted for; 1 where the server is busy, is not in sight within 5 s, or
+goes away (the next `serve` there cancels the goals that it left).
 """
 
 
@@ -42,8 +42,8 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "call",
-        help="let a server of trees run one",
-        description="Have a server of trees (`bt-actions serve`) run a tree; show how it goes.",
+        help="let a server of trees run a tree",
+        description="Let a server of trees (`bt-actions serve`) run a tree, and show the run.",
         epilog=_EPILOG,
     )
     parser.add_argument("tree", metavar="TREE", help="name of the tree at the server")
@@ -53,7 +53,7 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="NAME",
         type=action_name,
         default="run_tree",
-        help="action of the server; run_tree if not given",
+        help="action of the server (default: run_tree)",
     )
     add_option(parser, "--namespace", help="namespace of the server")
     add_option(parser, "--timeout")

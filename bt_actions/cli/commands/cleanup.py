@@ -14,15 +14,16 @@ if TYPE_CHECKING:
     from bt_actions.cli.arguments.parser import Subparsers
 
 _EPILOG = """\
-A process that is killed (kill -9, out of memory) cannot cancel its goals; the robot goes on. This
-finds them by their ids in the status of every action in sight. Goals of other clients are never
-touched, nor those of an orchestrator that is alive, on another machine or in another container. A
-container that is started again counts as another one, unless BT_ACTIONS_MACHINE names it: a name of
-its own for each container, the same each time.
+A killed process (kill -9, out of memory) cannot cancel its goals, and the robot goes on. `cleanup`
+finds these goals by their ids in the status of every action in sight, and cancels them. `cleanup`
+never touches goals of other clients, of a living process, of another machine or of another
+container. A restarted container counts as another one. To avoid that, give each container a name
+that stays, in BT_ACTIONS_MACHINE.
 
-No server shows a goal that it has not accepted yet. What a dead process had sent, and nobody had
-answered, is on record, and is awaited for half a minute or more (--accept). Otherwise a server that
-is not in sight is not asked: name its action, and that is no success.
+A server does not show a goal before it has accepted the goal. Goals that a dead process had sent,
+and that no server had answered, are on record; `cleanup` waits for them for 30 s or more
+(--accept). `cleanup` asks the servers in sight. Name an ACTION to fail where its server is not in
+sight.
 
 examples:
   bt-actions cleanup
@@ -33,10 +34,10 @@ in a launch file:
   Node(package="bt_actions", executable="bt-actions", arguments=["cleanup", "/r1/move_robot"])
 
 exit codes:
-  0 no server in sight has a goal that was left (should none take longer to accept one: --accept)
-  3 the end of a goal is unknown, or no action server is in sight, or one is silent; with an ACTION,
-  where its server is (others are not asked)
-  129, 130, 131, 143 stopped by SIGHUP, Ctrl-C, Ctrl-\\, SIGTERM; the ends known by then are told
+  0 no server in sight has a goal that was left (if none needs more than --accept for a goal)
+  3 the end of a goal is unknown, or no action server is in sight, or a server is silent; with an
+  ACTION, only its server counts
+  129, 130, 131, 143 stopped by SIGHUP, Ctrl-C, Ctrl-\\, SIGTERM; the known ends are printed
 """
 
 
@@ -44,8 +45,8 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "cleanup",
-        help="cancel the goals of a killed orchestrator",
-        description="Cancel the goals that killed bt_actions processes of this machine left.",
+        help="cancel the goals of a killed bt_actions process",
+        description="Cancel the goals that killed bt_actions processes left on this machine.",
         epilog=_EPILOG,
     )
     parser.add_argument(
@@ -53,7 +54,7 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="ACTION",
         type=action_name,
         nargs="*",
-        help="wait for its server for up to 30 s, and fail where that is not in sight",
+        help="wait for the server of this action for up to 30 s; without it, exit code 3",
     )
     parser.add_argument(
         "--look", metavar="S", type=seconds, default=5.0, help="time to look for servers [5 s]"

@@ -26,12 +26,12 @@ examples:
   bt-actions diff monday.mcap pick_and_place
   bt-actions diff --tolerance 0.05 3f2a 9c41
 
-Compared are the outcomes of each node in their order: SUCCESS, FAILURE, being stopped; of an action
-each goal, its outcome and its result; of a loop its rounds and items. Times, ids and feedback are
-no difference, nor is the order in which branches of a parallel get on.
+`diff` compares for each node the ends of its visits in their order (SUCCESS, FAILURE, stopped), of
+an action also its goals with outcomes and results, of a loop its rounds and items. Times, ids,
+feedback and the interleaving of parallel branches are no difference.
 
 exit codes:
-  0 the runs do not part   1 they part   2 a run is not there, or they are of two trees
+  0 the runs do not part   1 they part   2 a run does not exist, or the runs are of two trees
 """
 _LETTERS = ("A", "B")
 
@@ -40,8 +40,8 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "diff",
-        help="tell where two runs of a tree part",
-        description="Tell the first node at which two recorded runs of a tree part.",
+        help="show where two runs of a tree part",
+        description="Show the first node at which two recorded runs of a tree part.",
         epilog=_EPILOG,
     )
     parser.add_argument("a", metavar="RUN", help=RUN)
@@ -85,7 +85,7 @@ def _walk(run: str, places: Places) -> tuple[Walk, str]:
         if walk.state.began is None:
             raise RecordingError(f"{recording.first} holds no run")
         if walk.state.finished is not None or walk.state.ended is not None:
-            return walk, "nothing more there"
+            return walk, "no further outcome"
         if is_written(recording.first):
             return walk, "nothing yet: the run goes on"
         return walk, "nothing more: its process was killed"

@@ -41,8 +41,8 @@ keys:
   + -           faster, slower: 1, 2, 5, 10, 100 times
   q, Ctrl-C     end
 
-Where standard input or output is no terminal, the run is written at once, as lines.
-Exit codes: 0, or 2 for a run that is not there or cannot be read; 130 after Ctrl-C.
+Where standard input or output is no terminal, `replay` prints the whole run at once, as lines.
+Exit codes: 0, or 2 for a run that does not exist or cannot be read; 130 after Ctrl-C.
 """
 FRAME = 0.1
 """Seconds between two drawings."""

@@ -24,7 +24,7 @@ examples:
   bt-actions report -o run.html                  # the page of `bt-actions view`, in one file
   bt-actions report -o issue.md --no-values      # for others: no goal, result, input or variable
 
-Runs below a RunTree leaf that failed are told behind it, as far as they are recorded here.
+The report adds the runs below a RunTree leaf that failed, where this machine has recorded them.
 """
 _FORMS = (".md", ".json", ".html")
 
@@ -33,8 +33,8 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "report",
-        help="tell why a recorded run failed, and everything it did",
-        description="Tell a recorded run: why it failed, its actions, and what happened when.",
+        help="tell why a recorded run failed, and what happened in it",
+        description="Tell why a recorded run failed, how its actions ended, and what happened.",
         epilog=_EPILOG,
     )
     parser.add_argument(
@@ -44,12 +44,12 @@ def add_parser(subparsers: Subparsers) -> None:
         default="",
         help=f"{RUN} [the last]",
     )
-    parser.add_argument("--full", action="store_true", help="all lines, however long the run was")
+    parser.add_argument("--full", action="store_true", help="print all lines of a long run")
     parser.add_argument(
         "--no-values",
         dest="values",
         action="store_false",
-        help="without goals, results, inputs, variables, items and what the tree logs",
+        help="leave out goals, results, inputs, variables, items and texts of log nodes",
     )
     parser.add_argument(
         "-o", "--output", metavar="FILE", type=Path, help="file to write: .md, .json or .html"
@@ -59,7 +59,7 @@ def add_parser(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Read the run, and tell it."""
     if args.output is not None and args.output.suffix not in _FORMS:
-        raise BadInput(f"-o {args.output}: a report is written as .md, .json or .html")
+        raise BadInput(f"-o {args.output}: the name of a report ends in .md, .json or .html")
     from bt_actions.recording import report
 
     with reading(args.run) as recording:

@@ -37,9 +37,9 @@ examples:
   bt-actions run patrol --ros-args --params-file patrol.yaml -p use_sim_time:=true
 
 Ctrl-C, Ctrl-\\, SIGTERM, SIGHUP, --timeout and a closed standard output all end a run in the same
-way: every goal is canceled and seen to its end. A second Ctrl-C leaves at once and says which
-goals are not accounted for; not one within a quarter of a second, as shells and wrappers pass the
-first one on. Exit codes: see `bt-actions --help`.
+way: the run cancels every goal and waits for its end. A second Ctrl-C ends the wait, and the run
+names the goals that may still run. Two signals within a quarter of a second count as one, as shells
+and wrappers pass signals on. Exit codes: see `bt-actions --help`.
 """
 
 
@@ -48,7 +48,8 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser(
         "run",
         help="run a tree",
-        description="Run a tree. A terminal shows the tree live; elsewhere each change is a line.",
+        description="Run a tree. In a terminal the command draws the tree live; elsewhere the "
+        "command prints a line for each change.",
         epilog=_EPILOG,
     )
     parser.add_argument("tree", metavar="TREE", help="path of a tree, or name of an installed one")
@@ -63,32 +64,32 @@ def add_parser(subparsers: Subparsers) -> None:
         "--name",
         metavar="NAME",
         type=node_name,
-        help="name of the node; bt_actions_ and the tree's name where not given",
+        help="name of the node (default: bt_actions_TREE)",
     )
     add_option(parser, "--timeout", help="end the run after so many seconds, with exit code 124")
     parser.add_argument(
         "--cleanup-first",
         action="store_true",
-        help="cancel the goals of a killed orchestrator of this machine before the tree starts; "
-        "wait 30 s for the tree's servers, and do not run where goals may be left unseen",
+        help="first cancel the goals that a killed bt_actions process of this machine left; wait "
+        "30 s for the servers of the tree, and do not run the tree without them",
     )
     add_option(parser, "--no-python")
     add_option(parser, "--json")
     parser.add_argument(
         "--plain",
         action="store_true",
-        help="write lines in a terminal, too, as in a pipe, and as where TERM is dumb",
+        help="print lines in a terminal, too, as in a pipe; TERM=dumb does the same",
     )
     parser.add_argument(
         "-v",
         "--verbose",
         action="store_true",
-        help="among lines, write one for every state of every goal",
+        help="print a line for every state of every goal, too",
     )
     add_ros_args(
         parser,
-        "; parameters (-p NAME:=VALUE, --params-file FILE) give inputs of the tree their values "
-        "where --set does not",
+        "; parameters (-p NAME:=VALUE, --params-file FILE) give inputs of the tree their values, "
+        "unless --set does",
     )
     add_options(parser, one_run=True)
     add_view(parser)
@@ -101,8 +102,8 @@ def add_parser(subparsers: Subparsers) -> None:
     servers.add_argument(
         "--sim-like",
         metavar="RUN",
-        help="run action servers that answer as those of a recorded run did: a file, the first "
-        "letters of its id, or a tree for its newest run",
+        help="run action servers that answer as the servers of a recorded run did; RUN is a file, "
+        "the first letters of an id, or a tree for its newest run",
     )
     add_option(
         simulated,
@@ -112,14 +113,14 @@ def add_parser(subparsers: Subparsers) -> None:
     add_option(
         simulated,
         "--speed",
-        help="speed of the simulation (not of the tree's deadlines); 1 where not given",
+        help="speed of the simulated robot, not of the tree's deadlines (default: 1)",
     )
     add_option(simulated, "--seed")
     simulated.add_argument(
         "--check-part",
         metavar="METRES",
         type=metres,
-        help="fail unless the simulated part lies there at the end",
+        help="fail unless the simulated part lies at this place at the end",
     )
 
 

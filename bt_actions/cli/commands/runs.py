@@ -40,7 +40,7 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser(
         "runs",
         help="list recorded runs",
-        description="List the runs that are recorded on this machine, the newest first.",
+        description="List the recorded runs of this user on this machine, the newest first.",
         epilog=_EPILOG,
     )
     parser.add_argument(
@@ -48,13 +48,15 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="prune",
         nargs="?",
         choices=("prune",),
-        help="remove the oldest runs, and say which",
+        help="remove the oldest recordings, and name them",
     )
-    parser.add_argument("--all", action="store_true", help="with prune: remove all runs")
+    parser.add_argument("--all", action="store_true", help="with prune: remove all recordings")
     parser.add_argument(
-        "--failed", action="store_true", help="only runs that failed or never finished"
+        "--failed", action="store_true", help="list only runs that failed or never finished"
     )
-    parser.add_argument("--tree", metavar="NAME", default="", help="only runs of this tree")
+    parser.add_argument(
+        "--tree", metavar="NAME", default="", help="list only the runs of this tree"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object a line")
 
 

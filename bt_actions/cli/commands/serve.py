@@ -36,25 +36,26 @@ examples:
   bt-actions serve --ros-args --params-file serve.yaml
   ros2 action send_goal /run_tree bt_actions_interfaces/action/RunTree "{tree: pick_and_place}"
 
-The action is `run_tree`, of type bt_actions_interfaces/action/RunTree; a tree's name is its file's.
-A goal with an unknown tree or wrong inputs is rejected, and `~/rejections` and the log say why.
-Where another server of the action is there already, this one waits until that is gone.
-After a crash, the goals that the killed server left are canceled first; where nobody can see what
-was left, it ends with exit code 3.
-Ctrl-C and SIGTERM end it: all goals are canceled and drained first. A second Ctrl-C leaves at once
-and says which goals are not accounted for (exit code 3).
+The action is `run_tree`, of type bt_actions_interfaces/action/RunTree. The name of a tree is that
+of its file. `serve` rejects a goal with an unknown tree or wrong inputs; `~/rejections` and the log
+have the reason.
+Where another server of the action is in sight, this one waits until the other is gone.
+After a crash, `serve` first cancels the goals that the killed server left; where an action server
+of these goals is not in sight, the exit code is 3.
+At Ctrl-C and SIGTERM `serve` cancels all goals, and waits for their ends. A second Ctrl-C ends the
+wait, and `serve` names the goals that may still run (exit code 3).
 """
 
 _POLICIES = ("reject", "queue", "replace", "parallel")
 _ONE_AT_A_TIME = ("reject", "replace")
 _LISTS = {"trees": "DIR", "python": "PACKAGE"}
 _HELP = {
-    "trees": "a folder of trees, or package://NAME/trees; repeatable; nothing outside is read; "
-    "./trees where not given",
-    "policy": "what to do with a goal while another runs (default: reject)",
-    "max": "how many goals may wait (queue), or run (parallel); 10 where not given",
+    "trees": "a folder of trees, or package://NAME/trees; repeatable; serve reads no file outside "
+    "(default: ./trees)",
+    "policy": "the reaction to a goal while another one runs (default: reject)",
+    "max": "how many goals may wait (queue), or run (parallel) (default: 10)",
     "python": "a package whose classes the trees' python: nodes may name; repeatable",
-    "managed": "stay unconfigured, until a lifecycle manager configures and activates it",
+    "managed": "stay unconfigured until a lifecycle manager configures and activates the node",
 }
 """Help for the options that are parameters of the node, too."""
 
@@ -84,7 +85,7 @@ def add_parser(subparsers: Subparsers) -> None:
     add_options(parser, one_run=False)
     add_view(parser)
     add_option(parser, "--publish-values")
-    more = f"; the parameters {listing(_HELP)} are used where the options are not given"
+    more = f"; the parameters {listing(_HELP)} apply where the options are not given"
     add_ros_args(parser, more)
 
 

@@ -25,9 +25,9 @@ examples:
   bt-actions stats --simulated
   bt-actions stats --json | jq '.actions[] | select(.success < 0.9) | .server'
 
-Counted are the runs that `bt-actions runs` lists: those in a simulation (`run --sim`, `--sim-like`)
-are left out, or with --simulated the others. Of each phase of a goal: as long as half of the goals
-took at most, 95 in a hundred, and all.
+`stats` counts the runs in the list of `bt-actions runs`, without runs in a simulation (`run --sim`,
+`--sim-like`); with --simulated, only those. For each phase of a goal, p50 is the duration that half
+of the goals did not exceed, and p95 the duration that 95 of 100 goals did not exceed.
 Exit codes: 0, or 2 where no run is recorded.
 """
 
@@ -36,16 +36,16 @@ def add_parser(subparsers: Subparsers) -> None:
     """Add the command's parser."""
     parser = subparsers.add_parser(
         "stats",
-        help="tell how each action did over all recorded runs",
-        description="For each action: goals, attempts, outcomes and the duration of each phase, "
-        "over all recorded runs of this user.",
+        help="print how the actions did over all recorded runs",
+        description="Print for each action the goals, attempts, outcomes and the duration of each "
+        "phase, over all recorded runs of this user.",
         epilog=_EPILOG,
     )
-    parser.add_argument("--tree", metavar="NAME", default="", help="only runs of this tree")
+    parser.add_argument("--tree", metavar="NAME", default="", help="count only runs of this tree")
     parser.add_argument(
         "--simulated",
         action="store_true",
-        help="only runs in a simulation, which are left out otherwise",
+        help="count only runs in a simulation",
     )
     add_option(parser, "--json", help="print one JSON object")
 
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     meant = [each for each in runs if args.tree in ("", each.summary.tree)]
     if not meant:
         near = did_you_mean(args.tree, {each.summary.tree for each in runs})
-        raise BadInput(f"no recorded run is of a tree {args.tree!r}{near}")
+        raise BadInput(f"no run of a tree {args.tree!r} is recorded{near}")
     of_tree = len(meant)
     meant = [each for each in meant if each.summary.is_simulated == args.simulated]
     statistics, counted, left_out = Statistics(), 0, of_tree - len(meant)

@@ -27,9 +27,9 @@ from another computer:
   ssh -L 8650:127.0.0.1:8650 ROBOT bt-actions view --port 8650
   bt-actions view --host robot.example --certificate robot.pem    # on ROBOT, for the network
 
-The page reads recordings, and only reads: it cannot pause or halt a run. A run goes on as if nobody
-looked. The address holds a token that opens the runs of this user to whoever has it. Ctrl-C stops
-the page's server.
+The page reads recordings, and cannot pause or halt a run. A run goes on as if nobody looked. The
+address has a token: everybody with the address can see the runs of this user. Ctrl-C stops the
+server of the page.
 """
 
 
@@ -38,8 +38,8 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser(
         "view",
         help="show a run on a page, live or from its recording",
-        description="Serve a page that shows a run, to browsers of this computer: what runs and "
-        "waits, why the run failed, and all that happened. The one line of output is its address.",
+        description="Serve a page for browsers of this computer, which shows what a run does and "
+        "waits for, why the run failed, and what happened. The command prints the address.",
         epilog=_EPILOG,
     )
     parser.add_argument(

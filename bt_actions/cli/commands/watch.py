@@ -22,13 +22,13 @@ _EPILOG = """\
 examples:
   bt-actions watch                          # all runs of this user on this computer
   bt-actions watch pick_and_place           # runs of one tree
-  bt-actions watch 3f2a                     # the run whose id begins so
+  bt-actions watch 3f2a                     # the run whose id begins with 3f2a
   ssh -t ROBOT bt-actions watch
   bt-actions watch | grep FAILURE           # in a pipe, a line for each change
 
-The runs are those that are recorded, begun in whichever terminal; of one that is not, that is said.
-`bt-actions view` shows more of them in a browser.
-Exit codes: 130 after Ctrl-C, 143 after SIGTERM, 141 when nobody reads any more.
+`watch` shows the recorded runs of all terminals, and names runs without a recording. `bt-actions
+view` shows more of a run, in a browser.
+Exit codes: 130 after Ctrl-C, 143 after SIGTERM, 141 after the reader has closed the pipe.
 """
 FRAME = 0.2
 """Seconds between two looks."""
@@ -39,8 +39,8 @@ def add_parser(subparsers: Subparsers) -> None:
     parser = subparsers.add_parser(
         "watch",
         help="watch the runs that go on, in a terminal",
-        description="Tell what each run that goes on does and waits for, and the end of a run "
-        "with its cause, until Ctrl-C.",
+        description="Show what each running tree does and waits for, and the status and cause at "
+        "its end, until Ctrl-C.",
         epilog=_EPILOG,
     )
     parser.add_argument(
@@ -48,10 +48,10 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="NAME",
         nargs="?",
         default="",
-        help="only runs of this tree, or the run whose id begins so",
+        help="show only the runs of this tree, or the run whose id begins with NAME",
     )
     parser.add_argument(
-        "--plain", action="store_true", help="a line for each change, in a terminal, too"
+        "--plain", action="store_true", help="print a line for each change in a terminal, too"
     )
 
 

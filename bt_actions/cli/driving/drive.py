@@ -186,7 +186,7 @@ class Drive:
             self._lost = True
             if isinstance(error, OSError):
                 discard_stdout()
-            note(f"bt-actions: nothing more can be shown, and the run goes on: {error}")
+            note(f"bt-actions: the output cannot be written, and the run goes on: {error}")
 
     def _nobody_reads(self) -> None:
         """End the run after a closed standard output, and write to nowhere."""
@@ -258,7 +258,7 @@ class Drive:
         self._show(self._feed.view.finish)
         self._await_readers()
         if self._lost and code is Exit.SUCCESS:
-            note("bt-actions: the tree has succeeded; exit code 1, as that could not be shown")
+            note("bt-actions: exit code 1: the tree has succeeded, but its output is lost")
             code = Exit.FAILURE
         stop = self._state.stop
         if stop is not None and stop.who == Exit.SIGPIPE.name and code is not Exit.UNKNOWN:

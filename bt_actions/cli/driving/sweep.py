@@ -76,9 +76,9 @@ def _sweep(
         found.append(left)
         if left.awaited:
             note(
-                f"dead process {left.pid} sent a goal to {left.call.action} that was not answered: "
-                f"waiting for {left.takes:g} s or more, to cancel it should it be accepted: "
-                f"{left.goal_id.hex()}"
+                f"dead process {left.pid} sent a goal to {left.call.action}, without an answer: "
+                f"waiting for {left.takes:g} s or more, to cancel the goal if the server accepts "
+                f"it: {left.goal_id.hex()}"
             )
         else:
             note(
@@ -87,7 +87,7 @@ def _sweep(
             )
 
     def waits(names: list[str]) -> None:
-        note(f"waiting for {listing(names)}, where something may have been left")
+        note(f"waiting for {listing(names)}, which may have goals of a dead process")
 
     with starting_ros():
         return Cleanup(
@@ -122,17 +122,17 @@ def _tell_what_is_open(
     if swept.elsewhere:
         goals = (f"{goal_id.hex()} on {action}" for goal_id, action in swept.elsewhere.items())
         note(
-            f"not touched: {listing(goals, 1)}: of bt_actions on another machine, or in "
-            "another container, where it cannot be seen whether it is alive (see "
+            f"not touched: {listing(goals, 1)}: their process is on another machine, or in "
+            "another container, and nobody can see from here whether the process is alive (see "
             "BT_ACTIONS_MACHINE)"
         )
     if stopped_by is not None:
-        note(f"stopped by {stopped_by.name} before all was seen")
+        note(f"stopped by {stopped_by.name} before all servers had answered")
         code = Exit(128 + stopped_by)
     elif not swept.known and not swept.unknown and not any_will_do:
         note(
-            f"no action is in sight in ROS domain {swept.domain}: nobody can see what was left; "
-            "start its server, or --look longer"
+            f"no action server is in sight in ROS domain {swept.domain}: nobody can see its goals; "
+            "start the server, or --look longer"
         )
         code = Exit.UNKNOWN
     else:
@@ -140,14 +140,14 @@ def _tell_what_is_open(
         for held_against, names in ((True, swept.missing), (False, others)):
             for trouble in sorted({swept.unknown[name] for name in names}):
                 who = [name for name in sorted(names) if swept.unknown[name] == trouble]
-                nobody = f"{trouble.format(listing(who))}: nobody can see what was left there"
+                nobody = f"{trouble.format(listing(who))}: nobody can see the goals there"
                 note(nobody + (hint if held_against else ""))
         code = Exit.UNKNOWN if swept.missing else code
     if swept.trouble is not None:
-        note(f"nobody can see what was sent and not answered: {swept.trouble}")
+        note(f"nobody can see the goals without an answer: {swept.trouble}")
         code = code or Exit.UNKNOWN
     if not all(goal.is_over for goal in swept.left):
-        note("not all of them have ended; they may still be running")
+        note("not all of these goals have ended; they may still run")
         code = Exit.UNKNOWN
     return code
 

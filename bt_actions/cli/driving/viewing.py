@@ -34,7 +34,9 @@ def show(args: argparse.Namespace, shown: str = "") -> None:
     if not args.view:
         return
     if args.no_record or args.record is not None or os.environ.get(VARIABLE) == "off":
-        raise BadInput("--view shows runs that are recorded where `bt-actions runs` finds them")
+        raise BadInput(
+            "--view shows a recording in the usual folder: leave --no-record or --record away"
+        )
     need_page()
     from bt_actions.page import standing
 

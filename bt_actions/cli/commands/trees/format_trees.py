@@ -84,7 +84,7 @@ def _formatted(name: str) -> tuple[str, str]:
     except DocumentError as error:
         raise BadInput(findings_text(error), prefixed=False) from None
     except FormatError as error:
-        raise BadInput(f"{name}: {error}; it was left as it is") from None
+        raise BadInput(f"{name}: {error}; the file is unchanged") from None
 
 
 def _replace(path: Path, text: str) -> None:

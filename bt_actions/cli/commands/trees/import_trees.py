@@ -78,7 +78,7 @@ def _write(imported: Imported, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in imported.files.items():
             if name.endswith(".py") and (folder / name).exists():
-                note(f"{folder / name} is there, and stays: somebody may have written in it")
+                note(f"{folder / name} exists, and stays as it is: the file may have code of yours")
                 continue
             replace_file(folder / name, text.encode())
     except OSError as error:

@@ -25,7 +25,7 @@ def _warn(hazards: Hazards, node: TreeNode, bounded: bool) -> None:
     for child in hazards.begin_anew(_unpaced(node.children), End.SUCCESS):
         hazards.source.report(
             "BT306", span_of(child.key),
-            f"this starts again at each tick once it has succeeded, while a later child of "
+            f"this begins again at each tick after a success, while a later child of "
             f"{node.name!r} runs",
             hint="{every: 1 s, child: ...}, or {every: none, child: ...} for once in a visit",
             related=Related(node.place, "in this pipeline"),

@@ -21,7 +21,7 @@ def _warn(hazards: Hazards, node: TreeNode, _bounded: bool) -> None:
         return
     if not hazards.doubts.below(above):
         hazards.source.report(
-            "BT324", span_of(node.key), f"{above.key.text!r} does not begin this again",
+            "BT324", span_of(node.key), f"{above.key.text!r} never begins this again",
             hint="'every' stands below a 'pipeline', or a 'repeat'",
         )  # fmt: skip
 

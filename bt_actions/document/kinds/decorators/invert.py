@@ -13,7 +13,7 @@ def _build(node: TreeNode, context: Context, child: Behaviour) -> Behaviour:
 
 
 def _warn(hazards: Hazards, node: TreeNode, _bounded: bool) -> None:
-    """Report a check that fails where nothing has come on its topic, a success here: BT314."""
+    """Report a check without a message, whose failure is a success here: BT314."""
     asked = [inner for child in node.children for inner in child.walk()]
     kinds = {inner.kind for inner in asked}
     if not all(kind.in_turn or (kind.only_asks and not kind.slow) for kind in kinds):
@@ -35,7 +35,7 @@ def _warn(hazards: Hazards, node: TreeNode, _bounded: bool) -> None:
         text = first.expression.text.strip()
         hint = f"check: not {text if names_value(text) else f'({text})'}"
     hazards.source.report(
-        "BT314", span_of(node.key), f"this succeeds, too, while nobody knows ${topic}", hint=hint
+        "BT314", span_of(node.key), f"this also succeeds while ${topic} has no message", hint=hint
     )
 
 
