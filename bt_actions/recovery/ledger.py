@@ -1,9 +1,9 @@
-"""The ledger: goals of this process without an answer yet, on record should it be killed. No ROS.
+"""The ledger: the record of goals without an answer yet, for the case of a killed process. No ROS.
 
-A server shows the goals that it has accepted. A goal that a server has received, and has not
-decided on yet, is known to its sender alone. A sender that is killed tells nobody, and the robot
-moves later. So each process has a file, named by the beginning of its goals' ids (ids.py), with a
-slot for each goal without an answer. The file outlives a killed process, and cleanup reads it
+A server shows the goals that it has accepted. Only the sender knows of a goal that the server has
+received, and has not decided on yet. A killed sender tells nobody, and the robot moves later. So
+each process has a file, named by the beginning of its goals' ids (ids.py), with a slot for each
+goal without an answer. The file outlives a killed process, and cleanup reads it
 (recovery/sweep.py). The file lies in memory (/dev/shm), in a directory that only this user may
 write to, and is mapped: a system call for each goal would give Python's lock away.
 

@@ -160,7 +160,7 @@ class RollCall:
 
 @dataclass(slots=True)
 class LeftBehind:
-    """A goal whose orchestrator is dead. `end` is UNKNOWN until the server tells.
+    """A goal whose process is dead. `end` is UNKNOWN until the server tells.
 
     Where two servers of one name were in sight, the end stays UNKNOWN: either may run the goal, and
     a status does not tell whose it is.

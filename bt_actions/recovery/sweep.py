@@ -1,14 +1,14 @@
-"""The sweep: goals that a killed orchestrator left on servers are found and canceled.
+"""The sweep finds the goals that killed bt_actions processes left on servers, and cancels them.
 
-A process that dies by SIGKILL cancels nothing. Its goals are found in the status topics of all
-actions in sight, recognized by their ids (ids.py), and canceled one by one. Goals of other clients,
-of living orchestrators, and of orchestrators that this machine cannot look for, are never touched.
-No action type is needed for any of it. A server has nothing to tell when it has answered for long
-enough (roll_call.py).
+A process that dies by SIGKILL cancels no goal. The sweep reads the status topics of all actions in
+sight, knows the goals of dead processes by their ids (ids.py), and cancels them one by one. The
+sweep never touches goals of other clients, of living processes, or of processes that this machine
+cannot see. The sweep needs no action type. A server that has answered for long enough has no
+further goal to tell (roll_call.py).
 
 No status shows a goal that its server has not accepted yet. Such a goal is on its sender's record
-(ledger.py). The sweep awaits the goal until a server shows it, or until it is sure that none will,
-and asks the server again and again to cancel it.
+(ledger.py). The sweep waits until a server shows the goal, or until no server can have it any more,
+and asks the server again and again to cancel the goal.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Swept:
 
 @dataclass(kw_only=True)
 class Cleanup:
-    """The cancel of goals that dead orchestrators of this machine left.
+    """The cancel of goals that dead bt_actions processes of this machine left.
 
     `run` returns them with ends.
 

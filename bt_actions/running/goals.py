@@ -1,7 +1,7 @@
 """The goals of a tree's runs: membership, their changes as events, and the unaccounted ones.
 
-A goal is the tree's where its leaf, wherever that is by now, was last ticked in one of its ticks.
-Changes are told on the thread on which they happen. Nothing is sent here.
+A goal belongs to the tree that ticked its leaf last, even if a program has moved the leaf since. A
+change becomes an event on the thread where the change happens. No function here sends a message.
 """
 
 from __future__ import annotations

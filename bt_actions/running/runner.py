@@ -1,4 +1,4 @@
-"""The runner of a tree on a thread: the caller's in `run`, one of its own after `start`.
+"""The runner of a tree, on the thread of the caller (`run`) or on a thread of its own (`start`).
 
 This file has threads, signals, shutdown and the end of the process; running/loop.py has the steps
 of a run. ROS comes in through wiring.py, when a runner is made.

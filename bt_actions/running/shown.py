@@ -1,6 +1,6 @@
 """The view of ROS on a run beside its goals: inputs as parameters, and the run's life on `/rosout`.
 
-Nothing here prints a line. Knows ROS by wiring.py alone.
+No function here prints. wiring.py is the only door to ROS.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The watchdog of a run, on the alarm's thread.
 
-It sees a tick that lasts, or the end of a run in vain.
+The watchdog notices a tick that lasts, and a run that shall end and does not.
 
 While a behaviour does not return from its tick, no other code can stop the tree, or tell its state.
-The watchdog is run beside the endpoints, and has no thread of its own.
+The alarm runs the watchdog beside the endpoints; the watchdog has no thread of its own.
 """
 
 from __future__ import annotations

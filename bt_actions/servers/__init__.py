@@ -1,1 +1,1 @@
-"""The knowledge of the server on the other side. No ROS, no thread."""
+"""The facts about servers: their presence, reachability and replies. No ROS, no thread."""

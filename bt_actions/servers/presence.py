@@ -1,11 +1,11 @@
-"""One action server, seen from outside: whether it is there, alone, and still the same.
+"""One action server, seen from outside: whether the server is in sight, alone, and still the same.
 
-The watch takes what discovery shows (readiness, and the GIDs of the readers of goal requests), and
-the answers to probes. No ROS, no thread, no clock of its own. The watch sends nothing:
+The watch takes the facts of discovery (readiness, and the GIDs of the readers of goal requests),
+and the answers to probes. No ROS, no thread, no clock of its own. The watch sends nothing:
 `wants_probe` says that a probe is due.
 
 Two readers of goal requests are not yet two servers: a server that was killed stays in discovery
-until its lease runs out (20 s with Fast DDS as it comes). A probe is a question that every live
+until its lease runs out (20 s with the settings of Fast DDS). A probe is a question that every live
 server answers once. Two answers mean two servers. One answer and then silence mean a dead server
 and its successor.
 """

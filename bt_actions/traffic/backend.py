@@ -1,9 +1,9 @@
-"""The world as a leaf or a run needs it, as protocols: what `setup(node=...)` resolves to.
+"""The surroundings of a leaf or a run, as protocols; `setup(node=...)` finds the objects.
 
 This is the third part of the seam, beside transport.py and host.py, for the rooms above traffic/:
-behaviours/ and running/. Nothing in traffic/ uses this part. ros/node_participant.py implements
-these protocols over rclpy, for one node; testing/backend.py needs no node. Nothing of ROS is
-imported here.
+behaviours/ and running/. No file of traffic/ uses this part. ros/node_participant.py implements
+these protocols over rclpy, for one node; testing/backend.py needs no node. This file does not
+import ROS.
 """
 
 from __future__ import annotations

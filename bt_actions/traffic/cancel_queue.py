@@ -1,10 +1,10 @@
 """The queue of cancel requests to one server, with a bound on requests under way.
 
-A server keeps the last ten requests of all its clients together, and drops the others silently.
-Sixty goals that are interrupted in one moment would run for a second more, until they are canceled
-again. So further requests wait for an answer, or for the end of the time for one; first come, first
-served, over all endpoints to the server. Which goal is canceled, and when again, is for
-goals/goal.py to decide. The caller holds the host's lock.
+A server keeps the last ten requests of all its clients together, and drops the others silently. If
+sixty goals were canceled in one moment, fifty of them would run on until the next cancel, a second
+later. So further requests wait until an earlier one has its answer, or has waited long enough;
+first come, first served, over all endpoints to the server. goals/goal.py decides which goal to
+cancel, and when to cancel again. The caller holds the host's lock.
 """
 
 from __future__ import annotations

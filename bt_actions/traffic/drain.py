@@ -1,7 +1,7 @@
-"""The drain: goals that nobody wants any more are canceled and accounted for, under one deadline.
+"""The drain: cancel unwanted goals, and wait until they are accounted for, in bounded time.
 
-A drain cancels its goals, takes answers, and gives up in the end: no goal is waited for twice. What
-becomes of a goal, and when to ask anew, is for goals/goal.py to decide. `Drain` never waits;
+A drain cancels its goals, takes answers, and gives up at its deadline: no goal is waited for twice.
+goals/goal.py decides when to ask a server again, and when a goal has ended. `Drain` never waits;
 `drain` waits on the host's condition.
 """
 

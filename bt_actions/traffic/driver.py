@@ -1,9 +1,9 @@
-"""The driver of goals: a goal is told what happens, and the driver does what the goal decides.
+"""The driver of goals: events go to a goal, and the driver carries out what the goal decides.
 
-`tell` has a goal decide at once. The effects of the decision wait in one queue of the domain, and
-`_do_in_order` does them in the order of decision, so that nothing is done by recursion. Only a
-cancel looks again at what is true by then. A goal request that does not leave is told to the goal.
-The caller holds the host's lock.
+`tell` gives an event to a goal, which decides at once. The effects of the decision wait in one
+queue of the domain, and `_do_in_order` carries them out in the order of decision, so that no effect
+begins inside of another. Only a cancel checks again whether the goal still needs it. When a request
+cannot be sent, the goal gets an event, too. The caller holds the host's lock.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The calls of the world to an endpoint: answers come, and time passes.
+"""The calls from outside to an endpoint: answers come, and time passes.
 
-The word of a server is weighed (servers/replies.py), and told to the goal in question (driver.py).
-Nothing here decides about a goal, about living servers (servers/presence.py), or about sending
-(admission.py). The caller holds the host's lock.
+servers/replies.py weighs the answer of a server, and driver.py tells the answer to the goal. This
+file decides nothing: goals/goal.py decides about goals, servers/presence.py about living servers,
+admission.py about sending. The caller holds the host's lock.
 """
 
 from __future__ import annotations

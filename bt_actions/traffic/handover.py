@@ -1,8 +1,8 @@
 """The handover of goals that were lost, or left, from one endpoint to another of the same action.
 
-Each node discovers for itself. So a goal whose server has gone for one node belongs to whichever
-node of this process sees that server again, and is canceled first. The caller holds the host's
-lock.
+Each node discovers servers for itself. So a goal that lost its server belongs to the first node of
+this process that sees the server again; that node cancels the goal before it sends another. The
+caller holds the host's lock.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The route of one endpoint to its server: through its node's participant, or through another.
 
-Our participant may not see a server that runs (ros/rediscovery.py), or that server may not hear our
-participant (servers/reachability.py). Then another participant is looked for, and its transport is
-tried; `watcher.move_to` uses that transport until it is gone. Nothing here tells a goal anything.
-The caller holds the host's lock.
+The node's participant may not see a running server (ros/rediscovery.py), or the server may not hear
+that participant (servers/reachability.py). Then this file asks for another participant, and tries
+its transport; `watcher.move_to` uses that transport as long as it lasts. No function here tells an
+event to a goal. The caller holds the host's lock.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The scheduler of endpoints with open goals, which are run when due, ticks or not.
+"""The scheduler of endpoints with open goals: it runs them when they are due, ticks or not.
 
-The scheduler says when its owner is to run it (`wakes_at`): the alarm thread of ros/, or a loop in
-virtual time, sleeps until then. Its sleeps are short, so that a stall of the process is noticed; a
-stall while no goal was open stays unknown. No thread, and no clock of its own.
+The owner of the scheduler, the alarm thread of ros/ or a loop in virtual time, sleeps until
+`wakes_at`. The sleeps are short, so that the owner notices a stall of the process; without open
+goals a stall stays unknown. No thread, and no clock of its own.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The data of this room: a process, its ROS domains, their endpoints, and the goals on their way.
 
-Each belongs to the one before it, and knows it. These are values and registers, which decide
-nothing; the other files of this folder act on them. `Host` is a part of the seam: one a process
-with rclpy (ros/host.py), or one a simulated run (testing/host.py). All that goals share beyond
-their endpoints hangs on the host, and nothing hangs on a module.
+Each object belongs to the one before it in this list, and refers to it. The objects only hold data;
+the other files of this folder act on them. `Host` is a part of the seam: a process with rclpy has
+one (ros/host.py), and a simulated run has one (testing/host.py). The host holds everything that
+goals share beyond their endpoints; no module has state.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Entry:
 
 
 class Record:
-    """The record of requests without an answer, should the process be killed.
+    """The record of requests without an answer, for cleanup after a kill.
 
     This one keeps nothing.
 

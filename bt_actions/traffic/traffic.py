@@ -1,12 +1,12 @@
 """The goals of one node, as leaves use them: begin, send and interrupt a goal, and close it all.
 
-A leaf begins a goal here and advances the goal at its ticks. Once the request is out, answers,
-deadlines and the watch over the servers (scheduler.py) drive the goal, whether or not the leaf is
-ticked. A goal that its leaf leaves behind is thereby drained without the leaf.
+A leaf begins a goal here and advances the goal at its ticks. After the send, answers, deadlines and
+the watch over the servers (scheduler.py) drive the goal, with ticks of the leaf or without. So a
+goal that its leaf leaves behind is drained, too.
 
-One lock guards all of it. Nothing waits under the lock, and no code of the user's runs under it but
-`ActionBehaviour.settles`, which says so. This file decides nothing about a goal (goals/goal.py),
-its attempts (goals/attempts.py), or about sending (admission.py).
+One lock guards all of this. No thread waits under the lock, and the only user code under the lock
+is `ActionBehaviour.settles`, which says so. Others decide about a goal (goals/goal.py), about its
+attempts (goals/attempts.py), and about sending (admission.py).
 """
 
 from __future__ import annotations

@@ -8,9 +8,9 @@ process.
 The rule: the watcher decides when to look, and nothing else. A look is due every 50 ms while a goal
 waits for the server or several servers are shown, every 200 ms while goals run, and once a second
 at a server that is alone and ready, as long as the cheap count of servers stays the same. At each
-look presence.py says who lives, replies.py says what that means for each goal, and only a change is
-told. Arrived answers are taken before a goal is told that its server has gone, because they may be
-the server's last words.
+look presence.py tells which servers live, and replies.py what that means for each goal; a goal
+hears only of changes. The watcher takes arrived answers before it tells a goal that the server has
+gone, because they may be the server's last words.
 
 Why that is enough: a goal is sent only after a look that is a second old at most, and right after
 the send the servers are counted anew, so a server that came in between is known to have the

@@ -1,8 +1,8 @@
 """The checks of names and types, in their order.
 
 The checks of single kinds are in `document/kinds/`, those of single values in `checker.py`. A
-mistake in another file is told there where the file is wrong by itself, and at the import where
-the file is wrong in this tree only.
+finding about an imported file stands in that file where the file is wrong by itself. Where the file
+is wrong only in this tree, the finding stands at the import.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The common ground of all checks of names and types: what a document declares, writes and reads.
 
-Single values and expressions are checked here; `check.py` has the order of all checks. With
-`types=False` nothing of ROS is imported, and whatever would need ROS is taken as right.
+This file checks single values and expressions; `check.py` has the order of all checks. With
+`types=False` the checker does not import ROS, and accepts every part that only ROS could check.
 """
 
 from __future__ import annotations

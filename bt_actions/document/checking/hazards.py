@@ -1,6 +1,6 @@
-"""Hazards: trees that are allowed, and likely to go wrong on a robot. Each is a coded warning.
+"""Hazards: correct trees that are likely to go wrong on a robot. Each one is a coded warning.
 
-One checked document is looked at, and the trees that it includes where a hazard spans both. The
+The check looks at one document, and also at its included trees where a hazard spans both. The
 hazards of single kinds are in `document/kinds/`.
 """
 

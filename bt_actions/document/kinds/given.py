@@ -1,7 +1,7 @@
 """Names for the files of kinds, which must not import them: types for annotations, and behaviours.
 
-Reading and checking are to import no behaviour. So a module is imported here when a kind's `build`
-first takes something out of it, and the types say nothing at run time.
+Reading and checking import no behaviour, so that `bt-actions check` stays quick. A module of
+behaviours is imported when the `build` of a kind first uses it. The types exist only for mypy.
 """
 
 from importlib import import_module

@@ -1,17 +1,17 @@
-"""Doubts: what the errors of a document leave open. One mistake is to be told once.
+"""Doubts: questions that the errors of a document leave open. One mistake makes one finding.
 
-A part of the text that has an error is not read on, so the checker does not see what stands in it.
-The checker would then complain of things that are right: a variable would be unknown because its
-declaration is unread, or an action unused because its only user is. Each source keeps its unread
+The reader stops at an error, so the checker does not know the rest of that part of the text. The
+checker would then report correct parts: a variable would be unknown because its declaration is
+unread, or an action unused because its only user is unread. Each source keeps its unread
 parts (`Source.unread`): their YAML nodes, and flags for names that may be anything. From these
-`Doubts` answers, before such a finding is told:
+`Doubts` answers, before such a report:
 
-- A name is not called unknown where an unread part may declare the name (`declares`).
-- A name is not called unused where an unread part may use the name (`mentions`). Any word in an
+- The checker reports no unknown name that an unread part may declare (`declares`).
+- The checker reports no unused name that an unread part may use (`mentions`). Any word in an
   unread text counts as a use.
-- No hazard is told of a node that holds an unread part (`own`, `below`), whose settings are unread
-  (`alias`), or that includes a tree with errors. Whether a part lies inside of a node is decided by
-  the places of both in the text; an anchor in the text makes that uncertain, and the answer is yes.
+- The checker reports no hazard of a node that holds an unread part (`own`, `below`), whose settings
+  are unread (`alias`), or that includes a tree with errors. The places of a part and a node in the
+  text tell whether the part lies inside of the node. With an anchor in the text the answer is yes.
 """
 
 from __future__ import annotations

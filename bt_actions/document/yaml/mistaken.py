@@ -1,8 +1,8 @@
 """Texts that YAML reads in another way than their author is likely to mean.
 
-``Part #3`` is the text ``Part`` and a comment; where a space follows the '#', an author may well
-mean a comment, so nothing is said. In ``“map”`` the quotes are a part of the text. ``{x}`` is a
-mapping of x to nothing, where an author means a variable or a word. ``5000`` are seconds.
+``Part #3`` is the text ``Part`` and a comment. With a space after the '#' the author may well mean
+a comment, and gets no warning. In ``“map”`` the quotes are a part of the text. ``{x}`` is a mapping
+of x to nothing, where an author means a variable or a word. ``5000`` are seconds.
 """
 
 from __future__ import annotations
