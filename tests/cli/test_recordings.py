@@ -381,6 +381,29 @@ root:
         assert SECRET not in path.read_text()
 
 
+def test_a_machine_may_keep_events_without_values(
+    start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tree = tmp_path / "door.yaml"
+    tree.write_text("tree: door\ninputs: {floor: {type: string}}\nroot: {set: {where: $floor}}\n")
+    asked = ("run", str(tree), "--set", "floor=third-0815")
+    assert start(*asked).wait(30.0) == 0
+    [whole] = recordings()
+    monkeypatch.setenv("BT_ACTIONS_RECORD", "events")
+    assert start(*asked).wait(30.0) == 0
+    [bare] = {*recordings()} - {whole}
+    assert any(b"third-0815" in each for each in bytes_of(whole.parent))
+    assert not any(b"third-0815" in each for each in bytes_of(bare.parent))
+
+
+def test_a_wrong_word_for_what_a_machine_keeps_is_bad_input(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Out
+) -> None:
+    monkeypatch.setenv("BT_ACTIONS_RECORD", "event")
+    assert main(["run", "examples/guided.yaml", "--sim"]) == 2
+    assert "BT_ACTIONS_RECORD is 'event'; it is one of off, events, all" in capsys.readouterr().err
+
+
 def test_a_run_that_a_server_of_trees_ran_is_told_below_the_leaf(
     start: Start, tmp_path: Path, namespace: str, capsys: Out
 ) -> None:
