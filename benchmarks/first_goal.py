@@ -77,7 +77,7 @@ def _row(ours: str, theirs: str, work: str, yardstick: str, at_most: float) -> R
 _SCRIPT = "a minimal rclpy script"
 FAMILY = Family(
     [
-        _row("run", "script", "`bt-actions run` to its first goal at a server", _SCRIPT, 1.0),
+        _row("run", "script", "`bt-actions run` to its first goal at a server", _SCRIPT, 1.1),
         _row("--sim", "script", "the same with `--sim`, where nobody else can be", _SCRIPT, 0.25),
         _row("later", "sleeps", "the same, 1.2 s after it began", f"{_SCRIPT} that sleeps", 0.25),
     ],
