@@ -82,9 +82,9 @@ class Given:
         except ValueError:
             raise Refused("port", f"{name}={text!r} is no whole number") from None
 
-    def duration(self, name: str, default: str | None = None) -> str:
+    def duration(self, name: str) -> str:
         """Take a number of milliseconds, as a duration."""
-        found = self.whole(name, default)
+        found = self.whole(name)
         return f"= {found} / 1000" if isinstance(found, str) else milliseconds(found)
 
     def name(self, default: str = "") -> str:

@@ -256,8 +256,7 @@ def _for_each(given: Given) -> Node:
         raise Refused("port", "'value' names no variable")
     items: object = given.reference("queue")
     if items is None:
-        kind = {"LoopString": "string[]", "LoopBool": "bool[]"}.get(given.kind, "float64[]")
-        items = value_of(given.text("queue"), kind)
+        items = value_of(given.text("queue"), f"{LOOPS[given.kind].value}[]")
     else:
         given.converted("queue", "the list stays as it is: nothing is taken out of it")
     node = Node({"for_each": given.name(), "in": items, "as": given.scope[name],

@@ -55,9 +55,9 @@ def ros_name(value: object) -> str:
     return value
 
 
-def in_sequence(name: str, nodes: list[Node], kind: str = "sequence") -> Node:
+def in_sequence(name: str, nodes: list[Node]) -> Node:
     """Return some nodes as one."""
-    return nodes[0] if len(nodes) == 1 else Node({kind: name, "children": nodes})
+    return nodes[0] if len(nodes) == 1 else Node(sequence=name, children=nodes)
 
 
 def value_of(text: str, kind: str) -> object:

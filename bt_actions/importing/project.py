@@ -6,7 +6,6 @@ variables: a write to a port is a write to the caller's variable.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -31,10 +30,13 @@ from bt_actions.importing.scripts import (
 CONDITIONS = ("_failureIf", "_successIf", "_skipIf", "_while")
 AFTER = ("_onSuccess", "_onFailure", "_onHalted", "_post")
 SUBTREES = ("SubTree", "SubTreePlus", "Subtree")
-LOOPS = ("LoopInt", "LoopDouble", "LoopBool", "LoopString", "ForEach")
+LOOPS = {"LoopInt": Sort.NUMBER, "LoopDouble": Sort.NUMBER, "LoopBool": Sort.TRUTH,
+         "LoopString": Sort.TEXT, "ForEach": Sort.NUMBER}  # fmt: skip
+"""The sorts of their items."""
+SHARED = ("_autoremap", "__autoremap", "__shared_blackboard")
+"""Attributes of a subtree that shares all names with its caller."""
 _CALLED = ("Action", "Condition", "Control", "Decorator")
-_OWN = ("ID", "name", "_autoremap", "__autoremap", "__shared_blackboard", "_description", "_uid",
-        "_fullpath")  # fmt: skip
+_OWN = ("ID", "name", *SHARED, "_description", "_uid", "_fullpath")
 """Attributes that are no ports."""
 _MOST_FILES = 200
 _VARIABLE = re.compile(r"\s*\$?\{\s*([^{}]*?)\s*\}\s*")
@@ -55,8 +57,7 @@ def variable_in(text: str, port: str) -> str | None:
 
 def is_shared(element: Element) -> bool:
     """Return whether a subtree shares all names with its caller."""
-    wanted = ("_autoremap", "__autoremap", "__shared_blackboard")
-    return any(element.attributes.get(name) in ("true", "1") for name in wanted)
+    return any(element.attributes.get(name) in ("true", "1") for name in SHARED)
 
 
 def ports_of(element: Element) -> Iterator[tuple[str, str]]:
@@ -228,9 +229,7 @@ class Project:
             if kind == "GoalUpdater":
                 kind_of_port = "geometry_msgs/msg/PoseStamped"
             if kind in LOOPS and port == "queue":
-                kind_of_port = {"LoopString": "string[]", "LoopBool": "bool[]"}.get(
-                    kind, "float64[]"
-                )
+                kind_of_port = f"{LOOPS[kind].value}[]"
             if port in ("num_cycles", "num_attempts", "msec", "delay_msec"):
                 kind_of_port = "int64"
             if kind in SUBTREES and name is not None:
@@ -239,8 +238,7 @@ class Project:
             if kind in SUBTREES and name is None and not text.startswith("json:"):
                 self.sorts.add_text(port, text)
             if name is not None and kind in LOOPS and port == "value":
-                sorts = {"LoopString": Sort.TEXT, "LoopBool": Sort.TRUTH}
-                self.sorts.use(name, sorts.get(kind, Sort.NUMBER))
+                self.sorts.use(name, LOOPS[kind])
             if name is not None and kind_of_port:
                 self.types.setdefault(name, kind_of_port)
                 if (sort := _sort_of(kind_of_port)) is not None:
@@ -393,11 +391,7 @@ class Project:
                 yield from ((outer, each) for each in access)
 
     def _run(self, code: str) -> Iterator[tuple[str, str]]:
-        try:
-            found = statements(code)
-        except ScriptError:
-            return
-        for name, sign, value in found:
+        for name, sign, value in self._statements(code):
             yield from ((each, "r") for each in names_in(value))
             if name and sign not in (":=", "="):
                 yield name, "r"
@@ -487,8 +481,3 @@ def _sort_of(kind: str) -> Sort | None:
     if kind == "bool":
         return Sort.TRUTH
     return Sort.NUMBER if re.fullmatch(r"u?int\d+|float\d+|byte", kind) else None
-
-
-def of_json(text: str) -> object:
-    """Return the value of a text behind `json:`. Raises ValueError."""
-    return json.loads(text.removeprefix("json:"))

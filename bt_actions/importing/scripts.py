@@ -237,16 +237,16 @@ class Sorts:
         else:
             self._tell(name, Sort.TEXT)
 
-    def add(self, code: Iterable[Statement], key: Callable[[str], str] = str) -> None:
-        """Note a script; `key` returns the name here of a name in the script."""
+    def add(self, code: Iterable[Statement]) -> None:
+        """Note a script."""
         for name, sign, value in code:
-            self._use(value, Sort.ANY, key)
+            self._use(value, Sort.ANY)
             if name and value.kind == "name":
-                self.alike(key(name), key(value.signs[0]))
+                self.alike(name, value.signs[0])
             if name and sign in (":=", "=", "+="):
-                self._later.append((key(name), _renamed(value, key)))
+                self._later.append((name, value))
             elif name:
-                self._tell(key(name), Sort.NUMBER)
+                self._tell(name, Sort.NUMBER)
 
     def settle(self) -> None:
         """Share sorts among variables that take values from each other, once all is noted."""
@@ -258,9 +258,9 @@ class Sorts:
                 if self[one] is Sort.ANY and self[other] is not Sort.ANY:
                     self.use(one, self[other])
 
-    def add_condition(self, asked: Part, key: Callable[[str], str] = str) -> None:
+    def add_condition(self, asked: Part) -> None:
         """Note a condition, as `add` notes a script."""
-        self._use(asked, Sort.TRUTH, key)
+        self._use(asked, Sort.TRUTH)
 
     def alike(self, one: str, other: str) -> None:
         """Note that two variables are of one sort."""
@@ -273,10 +273,10 @@ class Sorts:
     def _tell(self, name: str, sort: Sort) -> None:
         self.told.setdefault(name, set()).add(sort)
 
-    def _use(self, part: Part, wanted: Sort, key: Callable[[str], str]) -> None:
+    def _use(self, part: Part, wanted: Sort) -> None:
         if part.kind == "name":
             if wanted is not Sort.ANY:
-                self.use(key(part.signs[0]), wanted)
+                self.use(part.signs[0], wanted)
             return
         inner = [wanted] * len(part.parts)
         if part.kind == "if":
@@ -292,15 +292,9 @@ class Sorts:
             found = {literal[each.kind] for each in part.parts if each.kind in literal}
             found |= {Sort.NUMBER for each in part.parts if each.kind in ("unary", "binary")}
             inner = [next(iter(found)) if len(found) == 1 else Sort.ANY] * len(part.parts)
-            names = [key(each.signs[0]) for each in part.parts if each.kind == "name"]
-            self._alike += pairwise(names)
+            self._alike += pairwise(each.signs[0] for each in part.parts if each.kind == "name")
         for each, sort in zip(part.parts, inner, strict=True):
-            self._use(each, sort, key)
-
-
-def _renamed(part: Part, key: Callable[[str], str]) -> Part:
-    signs = (key(part.signs[0]),) if part.kind == "name" else part.signs
-    return Part(part.kind, signs, tuple(_renamed(inner, key) for inner in part.parts))
+            self._use(each, sort)
 
 
 def say(

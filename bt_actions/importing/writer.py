@@ -25,6 +25,7 @@ from bt_actions.importing.project import (
     AFTER,
     CONDITIONS,
     SELECTORS,
+    SHARED,
     SUBTREES,
     Definition,
     Project,
@@ -220,7 +221,7 @@ class Writer:
     def _subtree(self, given: Given) -> Node:
         element = given.element
         inner = self.project.trees.get(element.attributes.get("ID", ""))
-        for name in ("_autoremap", "__autoremap", "__shared_blackboard"):
+        for name in SHARED:
             if name in element.attributes:
                 given.converted(name)
         if inner is None or inner.root is None:
@@ -307,7 +308,7 @@ class Writer:
             node = self.node(inner.root, own)
         finally:
             self._inside.pop()
-        return in_sequence(given.name(inner.name), [*before, node]) if before else node
+        return in_sequence(given.name(inner.name), [*before, node])
 
 
 def _read_only(root: Node) -> set[str]:
