@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from contextvars import ContextVar
-from typing import Any, Protocol
+from typing import Any
 
 from bt_actions.events.kinds import Event, VariableWritten
 from bt_actions.events.snapshot import HIDDEN, Value, snapshot
@@ -19,12 +19,6 @@ _OF_LOAD = re.compile(r"^/bt/\w+/\d+/")
 """The beginning of the blackboard's key of a tree's variable, which each load has anew."""
 OFTEN = 0.2
 """Seconds between two events of one goal's feedback, and of one variable."""
-
-
-class Named(Protocol):
-    """A node: any object that is hashable by identity."""
-
-    name: str
 
 
 class Teller:
