@@ -143,14 +143,7 @@ class TickLoop:
         self._timeout, self._deadline = timeout, math.inf if timeout is None else now + timeout
         self._error = self._drain = None
         self._status, self._burst = Status.INVALID, 0
-        teller = self.teller
-        self._visitor = ChangeVisitor(
-            self._set_up_missing,
-            self._after_each,
-            teller.changed,
-            teller.goes_on,
-            lambda: teller.is_heard,
-        )
+        self._visitor = ChangeVisitor(self._set_up_missing, self._after_each, self.teller)
         self.teller.begin()
         self.goals.run_goes_on = True
         self.watchdog.begin(self._deadline)

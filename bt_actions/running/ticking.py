@@ -11,6 +11,7 @@ from py_trees.trees import BehaviourTree
 from py_trees.visitors import VisitorBase
 
 from bt_actions.behaviours.action import ActionBehaviour
+from bt_actions.running.telling import TreeTeller
 
 QUIET_REST = 2.0
 """Seconds between two ticks of a tree in which nothing watches the clock; a longer heartbeat
@@ -65,20 +66,14 @@ class ChangeVisitor(VisitorBase):
         self,
         before: Callable[[], None],
         after_each: Callable[[], str],
-        tell: Callable[[Behaviour], None] = lambda behaviour: None,
-        settle: Callable[[Behaviour], None] = lambda behaviour: None,
-        is_heard: Callable[[], bool] = lambda: True,
+        teller: TreeTeller,
     ) -> None:
         """Make the visitor; `before` is called between a tick's handlers and its first behaviour.
 
-        `after_each` is called when a behaviour has ticked, and returns a fault of it. In a tick at
-        whose beginning `is_heard` holds, `tell` is called then, where its status is new or its
-        visit ends, and `settle` where it goes on running. For a stopped behaviour, `tell` is always
-        called.
+        `after_each` is called when a behaviour has ticked, and returns a fault of it.
         """
         super().__init__(full=False)
-        self._before, self._after_each, self._tell = before, after_each, tell
-        self._settle, self._is_heard = settle, is_heard
+        self._before, self._after_each, self._teller = before, after_each, teller
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
         self._kinds = {Behaviour}  # of visited nodes; any class, for a tree that shows nothing
@@ -103,8 +98,8 @@ class ChangeVisitor(VisitorBase):
         is none, and goes on with its parent. After a tick, no other behaviour is INVALID.
         """
         after_each, visited, none = self._after_each, self._visited, Status.INVALID
-        live, running, tell, settle = self._live, Status.RUNNING, self._tell, self._settle
-        known, heard = self._known, self._is_heard()
+        live, running, teller = self._live, Status.RUNNING, self._teller
+        known, heard = self._known, teller.is_heard
         for behaviour in ticked:
             for visitor in others:
                 behaviour.visit(visitor)
@@ -120,14 +115,14 @@ class ChangeVisitor(VisitorBase):
                 if known.get(behaviour) is not status:
                     known[behaviour], self._changed = status, True
                 if heard:
-                    tell(behaviour)
+                    teller.changed(behaviour)
             elif behaviour not in live:
                 live[behaviour] = None
                 known[behaviour], self._changed = status, True
                 if heard:
-                    tell(behaviour)
+                    teller.changed(behaviour)
             elif heard:
-                settle(behaviour)
+                teller.goes_on(behaviour)
             if wrong := after_each():
                 raise Misbehaviour(behaviour, wrong)
 
@@ -150,7 +145,7 @@ class ChangeVisitor(VisitorBase):
             del self._live[node]
             self._known.pop(node, None)
             self._changed = True
-            self._tell(node)
+            self._teller.changed(node)
 
     @property
     def watching(self) -> bool:

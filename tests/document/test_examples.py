@@ -26,8 +26,8 @@ from bt_actions.document.formatting.format import format_source
 from bt_actions.document.kinds import KINDS
 from bt_actions.document.yaml.source import read_source
 from bt_actions.events import Logged
-from bt_actions.running.ticking import ChangeVisitor
 from bt_actions.testing import Script, ScriptedServer, Simulation, VirtualNetwork, VirtualRunner
+from tests.support.trees import unheard
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted(ROOT.glob("examples/*.yaml"))
@@ -146,7 +146,7 @@ def test_a_behaviour_is_called_as_its_kind(node: Node) -> None:
 
 def test_what_looks_at_nothing_but_its_children_or_its_goal_costs_no_ticks(node: Node) -> None:
     def watches(root: Behaviour) -> bool:
-        visitor = ChangeVisitor(lambda: None, lambda: "")
+        visitor = unheard()
         root.status = Status.RUNNING
         visitor.run(root)
         visitor.finish()

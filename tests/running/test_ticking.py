@@ -9,7 +9,7 @@ import py_trees
 from py_trees.composites import Sequence
 
 from bt_actions.behaviours.decorators import Repeat
-from bt_actions.running.ticking import ChangeVisitor
+from tests.support.trees import unheard
 
 
 def test_a_class_that_is_made_of_one_may_look_at_more() -> None:
@@ -17,7 +17,7 @@ def test_a_class_that_is_made_of_one_may_look_at_more() -> None:
         pass
 
     for make, watched in ((Repeat, False), (Curious, True)):
-        visitor = ChangeVisitor(lambda: None, lambda: "")
+        visitor = unheard()
         node = make("R", py_trees.behaviours.Success("A"), None)
         node.tick_once()
         visitor.run(node)
@@ -28,7 +28,7 @@ def test_a_class_that_is_made_of_one_may_look_at_more() -> None:
 def test_what_was_pruned_in_a_run_is_not_kept() -> None:
     root = Sequence("root", memory=False)
     ticking = py_trees.trees.BehaviourTree(root)
-    visitor = ChangeVisitor(lambda: None, lambda: "")
+    visitor = unheard()
     ticking.visitors.append(visitor)
 
     def tick() -> None:

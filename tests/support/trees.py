@@ -5,13 +5,16 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import ParallelPolicy, Status
 from py_trees.composites import Parallel, Selector, Sequence
 
 from bt_actions import ActionBehaviour, TreeRunner
+from bt_actions.running.telling import TreeTeller
+from bt_actions.running.ticking import ChangeVisitor
 
 
 @contextmanager
@@ -20,6 +23,12 @@ def started(root: Behaviour, **settings: Any) -> Iterator[TreeRunner]:
     with TreeRunner(root, **settings) as runner:
         runner.start()
         yield runner
+
+
+def unheard() -> ChangeVisitor:
+    """A visitor of ticks whose changes nobody hears."""
+    nobody = SimpleNamespace(is_heard=False, changed=lambda node: None)
+    return ChangeVisitor(lambda: None, lambda: "", cast(TreeTeller, nobody))
 
 
 class Gate(Behaviour):
