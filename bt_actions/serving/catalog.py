@@ -244,14 +244,9 @@ def _digest(files: Mapping[Path, str]) -> str:
     """Return the digest of all files of a version, in the order of their names."""
     digest = hashlib.sha256()
     for path, text in sorted(files.items()):
-        data = text.encode("utf-8", "surrogatepass") or _bytes(path)
+        data = text.encode("utf-8", "surrogatepass")
+        with contextlib.suppress(OSError):
+            data = data or path.read_bytes()  # of a data file
         digest.update(f"{path.name} {len(data)}\n".encode())
         digest.update(data)
     return digest.hexdigest()
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError:
-        return b""

@@ -45,7 +45,8 @@ class ServedGoal:
     def tell(self, now: float) -> None:
         """Send feedback to its client, if it is time; to be called every FASTEST seconds."""
         with self.run.told() as state:
-            changes = state.changes
-        if changes != self._told or now - self._told_at >= SLOWEST - FASTEST / 2:
-            self._told, self._told_at = changes, now
-            self.client.publish_feedback(feedback(self.run, begun=self.begun))
+            if state.changes == self._told and now - self._told_at < SLOWEST - FASTEST / 2:
+                return
+            self._told, self._told_at = state.changes, now
+            message = feedback(state, paused=self.run.paused, begun=self.begun)
+        self.client.publish_feedback(message)

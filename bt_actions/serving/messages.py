@@ -37,15 +37,14 @@ def result(outcome: RunOutcome) -> RunTree.Result:
     )
 
 
-def feedback(run: Run, *, begun: bool) -> RunTree.Feedback:
+def feedback(state: State, *, paused: bool, begun: bool) -> RunTree.Feedback:
     """Return the progress of a run."""
-    with run.told() as state:
-        return RunTree.Feedback(
-            running=[_leaf(state, each) for each in state.running[:SHOWN]],
-            leaves_ended=state.leaves_ended,
-            paused=run.paused,
-            waiting=not begun,
-        )
+    return RunTree.Feedback(
+        running=[_leaf(state, each) for each in state.running[:SHOWN]],
+        leaves_ended=state.leaves_ended,
+        paused=paused,
+        waiting=not begun,
+    )
 
 
 def _leaf(state: State, story: NodeStory) -> RunningLeaf:

@@ -7,7 +7,10 @@ them.
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+from py_trees.common import Status
 
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
@@ -37,14 +40,7 @@ class Code(enum.IntEnum):
 
 
 OUTCOMES = {outcome: number for number, outcome in enumerate(Outcome, 1)}
-ENDS = {
-    End.UNKNOWN: 0,
-    End.SUCCEEDED: 1,
-    End.ABORTED: 2,
-    End.CANCELED: 3,
-    End.NEVER_STARTED: 4,
-    End.SERVER_GONE: 5,
-}
+ENDS = {End.UNKNOWN: 0} | {end: at for at, end in enumerate(End, 1) if end is not End.UNKNOWN}
 
 
 class Ending(enum.Enum):
@@ -86,7 +82,15 @@ class RunOutcome:
     @property
     def as_wanted(self) -> bool:
         """Whether the run is settled, and succeeded or was ended on request."""
-        return self.settled and self.code in (Code.NONE, *(each.value[0] for each in Ending))
+        return self.settled and self.status is not Status.FAILURE
+
+    @property
+    def status(self) -> Status:
+        """The status of the tree; INVALID where the run was ended on request."""
+        if self.code in (Code.NONE, Code.UNKNOWN):
+            return Status.SUCCESS
+        on_request = self.code in [each.value[0] for each in Ending]
+        return Status.INVALID if on_request else Status.FAILURE
 
 
 def outcome_of(
@@ -96,13 +100,13 @@ def outcome_of(
     ending: Ending | None = None,
     error: BaseException | None = None,
     outputs: str = "{}",
-    unaccounted: list[str] | None = None,
+    unaccounted: Iterable[str] = (),
 ) -> RunOutcome:
     """Put a run that is over into words and numbers.
 
     `outputs` is JSON; `unaccounted` has a line for each goal whose end is not known.
     """
-    left = tuple(unaccounted or ())
+    left = tuple(unaccounted)
     code: int
     if succeeded:
         code, why = Code.UNKNOWN if left else Code.NONE, ""

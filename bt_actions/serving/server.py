@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor, wait
-from typing import Any, NamedTuple
+from typing import Any
 
 from action_msgs.msg import GoalStatus
 from bt_actions_interfaces.action import RunTree
@@ -28,8 +28,8 @@ from bt_actions.ros.serving.endpoints import Endpoints
 from bt_actions.ros.serving.lifecycle import Lifecycle
 from bt_actions.ros.serving.precedence import Precedence
 from bt_actions.running.runner import TreeRunner
-from bt_actions.serving.catalog import Catalog
-from bt_actions.serving.control import Control
+from bt_actions.serving.catalog import Catalog, ServedTree
+from bt_actions.serving.control import control
 from bt_actions.serving.diagnostics import Diagnostics, TreeStanding
 from bt_actions.serving.goal import FASTEST, ServedGoal
 from bt_actions.serving.messages import finding, info, result
@@ -51,13 +51,8 @@ _LINGER = 0.25
 """Seconds for a client whose goal was just accepted to ask for the result."""
 
 
-class _Admitted(NamedTuple):
-    """The tree and inputs of an admitted goal, before its client knows."""
-
-    name: str
-    file: str
-    tree: Tree
-    inputs: Mapping[str, object]
+_Admitted = tuple[ServedTree, Tree, Mapping[str, object]]
+"""The tree and inputs of an admitted goal, before its client knows."""
 
 
 class TreeServer:
@@ -141,12 +136,7 @@ class TreeServer:
         silent = self.precedence.is_doubled
         endpoints.service(ListTrees, "~/list_trees", self._on_list, silent=silent)
         endpoints.service(CheckTree, "~/check_tree", self._on_check, silent=silent)
-        control = Control(
-            lambda: dict(self._goals),
-            lambda goal: self._end(goal, Ending.HALTED),
-            self._tell_of,
-        )
-        endpoints.service(ControlTree, "~/control_tree", control.answer, silent=silent)
+        endpoints.service(ControlTree, "~/control_tree", self._on_control, silent=silent)
         self._timer = endpoints.timer(FASTEST, self._tell, autostart=False)
         Diagnostics(endpoints, self._standings, self._worker.submit, self.precedence.yields)
         self.lifecycle: Lifecycle | None = None
@@ -254,14 +244,14 @@ class TreeServer:
     async def _on_goal(self, goal: RunTree.Goal) -> _Admitted | None:
         try:
             self._refuse_more()
-            entry, tree, values = await self._off(self.catalog.check, goal.tree, goal.inputs)
+            admitted: _Admitted = await self._off(self.catalog.check, goal.tree, goal.inputs)
             with self._lock:  # other goals may have been admitted meanwhile
                 self._refuse_more()
                 self._turns.expected += 1
         except GoalRefused as refused:
             self._rejections.tell(goal, refused)
             return None
-        return _Admitted(entry.name, str(entry.file), tree, values)
+        return admitted
 
     def _refuse_more(self) -> None:
         with self._lock:
@@ -274,18 +264,18 @@ class TreeServer:
             raise GoalRefused("INACTIVE", f"this server accepts no goals: {why}")
 
     def _on_accepted(self, client: Any, admitted: _Admitted) -> None:
+        entry, tree, inputs = admitted
         run = Run(
-            admitted.tree,
-            admitted.inputs,
+            tree,
+            inputs,
             self.node,
             watch=self._watch,
             asked_by=(bytes(client.goal_id.uuid).hex(), client.request.caller_run[:ECHO]),
             ended=lambda outcome: self._ended(goal, outcome),
             begins=lambda servers: self._underway.begins(goal.id, servers),
         )
-        called = clean(client.request.goal_name)[:ECHO]
-        begin = begins(admitted.file, admitted.tree, admitted.inputs, called)
-        goal = ServedGoal(client, run, admitted.name, begin)
+        begin = begins(str(entry.file), tree, inputs, clean(client.request.goal_name)[:ECHO])
+        goal = ServedGoal(client, run, entry.name, begin)
         with self._answered:
             self._goals[goal.id] = goal
             begun, halted = self._turns.come(goal)
@@ -336,6 +326,14 @@ class TreeServer:
             response.findings = [finding(refused.finding)]
         response.accepted = not response.findings
         return response
+
+    def _on_control(
+        self, request: ControlTree.Request, response: ControlTree.Response
+    ) -> ControlTree.Response:
+        def halt(goal: ServedGoal) -> None:
+            self._end(goal, Ending.HALTED)
+
+        return control(request, response, dict(self._goals), halt, self._tell_of)
 
     async def _off(self, work: Callable[..., Any], *arguments: Any) -> Any:
         """Do slow work on the worker's thread, not on the executor's."""

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from py_trees.common import Status
-
 from bt_actions.document import Tree
 from bt_actions.events.snapshot import HIDDEN
 from bt_actions.serving.catalog import ServedTree
-from bt_actions.serving.outcome import Code, Ending, RunOutcome
+from bt_actions.serving.outcome import RunOutcome
 from bt_actions.serving.requests import Mistake
 from bt_actions.story.words import begins_text, verdict
 from bt_actions.utilities.plain_text import clean
 
 SAME_NAME = "SAME_NAME"
-_STOPPED = tuple(each.value[0] for each in Ending)
 
 
 def begins(file: str, tree: Tree, inputs: Mapping[str, object], goal_name: str) -> str:
@@ -30,15 +27,10 @@ def ends(outcome: RunOutcome, seconds: float | None) -> str:
 
     Goals that are not accounted for have their own lines.
     """
-    status = Status.FAILURE
-    if outcome.code in (Code.NONE, Code.UNKNOWN):
-        status = Status.SUCCESS
-    elif outcome.code in _STOPPED:
-        status = Status.INVALID
     left = "" if outcome.settled else ", and not all of its goals are accounted for"
     why = outcome.why
     before = ":\n" if "\n" in why else ": " if why else ""  # each line of a log has a length
-    return f"ends: {verdict(status, seconds)}{left}{before}{why}"
+    return f"ends: {verdict(outcome.status, seconds)}{left}{before}{why}"
 
 
 def warnings_of(entry: ServedTree) -> list[Mistake]:

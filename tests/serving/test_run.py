@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from typing import Any
 from unittest.mock import Mock
 
@@ -32,7 +33,9 @@ def test_a_tick_that_does_not_return_is_told_in_the_feedback_while_it_lasts(node
     run.start()
 
     def told() -> list[tuple[str, str]]:
-        return [(each.path, each.message) for each in feedback(run, begun=True).running]
+        with run.told() as state:
+            running = feedback(state, paused=False, begun=True).running
+        return [(each.path, each.message) for each in running]
 
     until(lambda: told() == [("Grasp", "in its tick")])
     may_return.set()
@@ -49,8 +52,9 @@ def test_who_watches_a_run_is_told_its_end_though_its_story_cannot_be_told(
             raise KeyError(3)
         return outcome_of(*args, error=error, **more)
 
-    def watch(runner: TreeRunner) -> None:
+    def watch(runner: TreeRunner) -> Callable[[], str]:
         readers.append(runner.stream.reader())
+        return str
 
     monkeypatch.setattr(serving_run, "outcome_of", tell)
     readers, outcomes = list[Reader](), list[RunOutcome]()
