@@ -17,14 +17,13 @@ from bt_actions.events import Event, RunBegan
 from bt_actions.story.state import State
 from bt_actions.story.why import why_text
 from bt_actions.story.words import begins_text, judged, verdict
-from bt_actions.utilities.plain_text import in_words
 
 if TYPE_CHECKING:
     from bt_actions.running.runner import TreeRunner
 
 
 class ShownRun:
-    """The view of one run on its node; `close` must come while the node lives."""
+    """The view of one run on its node, until the runner is shut down."""
 
     def __init__(self, runner: TreeRunner, root: Behaviour) -> None:
         self._runner = runner
@@ -44,6 +43,7 @@ class ShownRun:
                 )
         self._rosout = wiring.rosout(runner.node)
         runner.observe_events(self._told)
+        runner.on_close(self.close)
 
     def _told(self, event: Event) -> None:
         self._state.fold(event)
@@ -51,27 +51,22 @@ class ShownRun:
             file = event.nodes[0].place.rsplit(":", 2)[0]
             self._rosout.say("info", f"{event.tree} {begins_text(file, event.inputs)}")
 
-    def close(self, *, left: bool = False, error: BaseException | None = None) -> None:
+    def close(self, *, left: bool = False) -> None:
         """Say how the run has ended.
 
         `left`: without a wait for its goals. A second call does nothing.
         """
         if not self._once.acquire(blocking=False):
             return
-        if self._state.began is None:
-            self._rosout.close()
-            return
-        state, name = self._state, self._state.tree
-        failed = "" if error is None else in_words(error)
-        if state.finished is not None and (state.finished.error or state.failures):
-            failed = why_text(state)
-        if failed:
-            self._rosout.say("error", f"{name}: {failed}")
-        unaccounted = self._runner.unaccounted
-        for goal in unaccounted:
-            self._rosout.say("error", f"{name}: not accounted for: {goal}")
-        text = f"{name} ends: {verdict(judged(state), state.elapsed)}"
-        text += ", left without waiting for its goals" if left else ""
-        wrong = left or unaccounted or failed
-        self._rosout.say("error" if wrong else "info", text)
+        state, name, unaccounted = self._state, self._state.tree, self._runner.unaccounted
+        if state.began is not None:
+            failed = state.finished is not None and (state.finished.error or state.failures)
+            if failed:
+                self._rosout.say("error", f"{name}: {why_text(state)}")
+            for goal in unaccounted:
+                self._rosout.say("error", f"{name}: not accounted for: {goal}")
+            text = f"{name} ends: {verdict(judged(state), state.elapsed)}"
+            text += ", left without waiting for its goals" if left else ""
+            wrong = left or failed or unaccounted or state.finished is None
+            self._rosout.say("error" if wrong else "info", text)
         self._rosout.close()

@@ -174,8 +174,7 @@ def test_a_program_of_the_users_shows_its_runs_so_too(watcher: Watcher, tmp_path
                     "root: {check: $speed < 1.0}\n")  # fmt: skip
     root = load_tree(path)
     with TreeRunner(root, name="of_a_program") as runner:
-        shown = ShownRun(runner, root)
-        runner.on_close(shown.close)
+        ShownRun(runner, root)
         assert runner.node.get_parameter("speed").value == 0.2
         runner.run()
         (begins,) = watcher.hears("of_a_program", "begins")
@@ -188,8 +187,7 @@ def test_a_program_of_the_users_shows_its_runs_so_too(watcher: Watcher, tmp_path
 def test_what_a_behaviour_raised_in_a_program_is_told_on_rosout(watcher: Watcher) -> None:
     root = Raises("bad", "update")
     with TreeRunner(root, name="of_a_bad_program") as runner:
-        shown = ShownRun(runner, root)
-        runner.on_close(shown.close)
+        ShownRun(runner, root)
         with pytest.raises(TreeError):
             runner.run()
         watcher.hears("of_a_bad_program", "begins")

@@ -94,9 +94,7 @@ class Session:
             )
         if outlook is not None:
             outlook.hand_over()
-        self._error: BaseException | None = None
         self._shown = ShownRun(self._runner, root)
-        self._runner.on_close(lambda: self._shown.close(error=self._error))
         if publish_values is not None and simulation is None:  # where nobody could listen
             from bt_actions.ros.run_topics import RunTopics
 
@@ -194,9 +192,6 @@ class Session:
         """Run the tree, drain its goals, and close servers, node and context."""
         try:
             self._runner.run()
-        except BaseException as error:
-            self._error = error
-            raise
         finally:
             self._runner.shutdown()
 
