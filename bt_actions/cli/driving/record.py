@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,9 +35,7 @@ def add_options(parser: argparse.ArgumentParser, *, one_run: bool) -> None:
     )
 
 
-def recorder(
-    args: argparse.Namespace, say: Callable[[str], None] = lambda text: note(f"bt-actions: {text}")
-) -> Recorder:
+def recorder(args: argparse.Namespace) -> Recorder:
     """Return the recorder of the command's runs, or one that says that none is kept.
 
     Raises BadInput.
@@ -50,13 +47,14 @@ def recorder(
     from bt_actions.recording.recorder import Recorder, Wish
 
     if args.no_record or (how == "off" and path is None):
-        return Recorder(Wish(why_not="--no-record" if args.no_record else f"{VARIABLE}=off"), say)
-    values = how != "events"
-    if args.command == "serve":
-        return Recorder(Wish(where=path, values=values), say)
-    if path is not None:
-        _refuse(path)
-    return Recorder(Wish(first=path, values=values), say)
+        wish = Wish(why_not="--no-record" if args.no_record else f"{VARIABLE}=off")
+    elif args.command == "serve":
+        wish = Wish(where=path, values=how != "events")
+    else:
+        if path is not None:
+            _refuse(path)
+        wish = Wish(first=path, values=how != "events")
+    return Recorder(wish, lambda text: note(f"bt-actions: {text}"))
 
 
 def _refuse(path: Path) -> None:
