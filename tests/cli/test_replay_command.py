@@ -145,7 +145,7 @@ def test_a_frame_is_the_same_however_the_player_came_there_and_fits(
 
     def frame(player: Player) -> list[str]:
         view.show(player)
-        return [str(line) for line in view._drawn]
+        return str(view._drawn).split("\n")
 
     on.is_paused = True
     for _ in range(41):

@@ -6,6 +6,7 @@ import io
 import json
 import math
 import re
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,11 @@ from bt_actions import MoveRobot, Retry
 from bt_actions.behaviours.decorators import Deadline
 from bt_actions.behaviours.leaves import Wait
 from bt_actions.cli.driving.feed import Feed
+from bt_actions.cli.streams.writing import terminal
 from bt_actions.cli.views.choosing import choose
 from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.lines import LASTING, LineView
-from bt_actions.cli.views.live import SCROLLS, LiveView, suits
+from bt_actions.cli.views.live import SCROLLS, LiveView
 from bt_actions.cli.views.view import View
 from bt_actions.document import load_tree
 from bt_actions.events import AttemptEnded, Event, RunEnded, StopWanted
@@ -913,22 +915,22 @@ def test_the_progress_line_survives_at_40_columns(
     stopping: bool, root: FakeNode, story: Story
 ) -> None:
     screen = Screen(24, width=40)
-    view = LiveView(story.told(), screen.console)
-    if stopping:
-        view.say("interrupted")
-    view.frame(story.time)
+    stop = [StopWanted(story._next(), "SIGINT", "interrupted")] if stopping else []
+    state = story.told(*stop)
+    view = LiveView(state, screen.console)
+    view.frame(state.started)
     keys = "again leaves" if stopping else "cancels"
     assert any(line.endswith(f"0.0 s  Ctrl-C {keys}") for line in screen.lines())
     view.close()
 
 
-@pytest.mark.parametrize(
-    ("environment", "drawn"),
-    [({"TERM": "xterm"}, True), ({"TERM": "dumb"}, False), ({"TERM": "unknown"}, False)],
-)
-def test_a_dumb_terminal_is_not_drawn_on(environment: dict[str, str], drawn: bool) -> None:
-    console = Console(file=io.StringIO(), force_terminal=True, _environ=environment)
-    assert suits(console) is drawn
+@pytest.mark.parametrize(("term", "drawn"), [("xterm", True), ("dumb", False), ("unknown", False)])
+def test_a_dumb_terminal_is_not_drawn_on(
+    monkeypatch: pytest.MonkeyPatch, term: str, drawn: bool
+) -> None:
+    monkeypatch.setenv("TERM", term)
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    assert (terminal() is not None) is drawn
 
 
 def test_choosing_what_to_show_costs_the_same_in_a_tree_of_100000_nodes() -> None:

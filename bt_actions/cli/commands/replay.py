@@ -12,7 +12,7 @@ from bt_actions.cli.arguments.options import add_option, number
 from bt_actions.cli.driving.recorded import RUN, progress, reading
 from bt_actions.cli.exits import Exit
 from bt_actions.cli.streams.results import keep_results_apart, results
-from bt_actions.cli.streams.writing import OutputLost
+from bt_actions.cli.streams.writing import OutputLost, terminal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -78,7 +78,8 @@ def run(args: argparse.Namespace) -> int:
     """Show the run that `args` name."""
     if args.json:
         keep_results_apart()
-    console = None if args.json or args.plain else _terminal()
+    takes_keys = sys.stdin is not None and sys.stdin.isatty()
+    console = terminal() if takes_keys and not (args.json or args.plain) else None
     with reading(args.run) as recording:
         if console is None:
             return _write(recording, _views(args))
@@ -90,18 +91,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 # Played
-
-
-def _terminal() -> Console | None:
-    """Return the terminal to draw on, and to take keys from, where there is one."""
-    if not (sys.stdin and sys.stdin.isatty() and sys.stdout.isatty()):
-        return None
-    from rich.console import Console
-
-    from bt_actions.cli.views.live import suits
-
-    console = Console(highlight=False, markup=False, emoji=False)
-    return console if suits(console) else None
 
 
 def _play(tape: Tape, console: Console, speed: float) -> int:

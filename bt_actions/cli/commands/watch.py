@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import sys
 import time
 from typing import TYPE_CHECKING
 
 from bt_actions.cli.exits import Exit
-from bt_actions.cli.streams.writing import write
+from bt_actions.cli.streams.writing import terminal, write
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -95,14 +94,8 @@ def _last(name: str) -> str:
 def _view(args: argparse.Namespace, last: str) -> WatchedLines | WatchedScreen:
     from bt_actions.cli.views.watched import NOTHING, WatchedLines, WatchedScreen
 
-    if sys.stdout.isatty() and not args.plain:
-        from rich.console import Console
-
-        from bt_actions.cli.views.live import suits
-
-        console = Console(highlight=False, markup=False, emoji=False)
-        if suits(console):
-            return WatchedScreen(console, last)
+    if not args.plain and (console := terminal()) is not None:
+        return WatchedScreen(console, last)
     if last:
         write(f"{NOTHING}; {last}\n")
     return WatchedLines()

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from functools import partial
 
 from bt_actions.cli.views.view import View
-from bt_actions.events import Event
+from bt_actions.events import Event, StopWanted
 from bt_actions.story.state import State
-from bt_actions.story.words import waiting_text
+from bt_actions.story.words import stopping_text, waiting_text
 
 SOON = 1.0
 """Seconds after the end of the tree without a word about goals that have not ended."""
@@ -41,6 +41,8 @@ class Feed:
         node = getattr(event, "node", None)
         if node is None or node in self.state.nodes:
             self._show(partial(self.view.event, event))
+        if isinstance(event, StopWanted) and not event.abandons:
+            self._show(partial(self.view.say, stopping_text(self.state)))
 
     def frame(self, now: float) -> None:
         """Show the state at `now`, on the steady clock."""

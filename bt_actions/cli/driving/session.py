@@ -24,7 +24,7 @@ from bt_actions.cli.exits import BadInput, Exit, importing_ros, leave, starting_
 from bt_actions.cli.streams.patient_file import gap_text
 from bt_actions.cli.streams.patient_output import PatientOutput
 from bt_actions.cli.streams.results import results
-from bt_actions.cli.streams.writing import note
+from bt_actions.cli.streams.writing import note, terminal
 from bt_actions.cli.views.json_lines import JsonView
 from bt_actions.cli.views.lines import LineView
 from bt_actions.cli.views.view import View
@@ -130,14 +130,10 @@ class Session:
         """Return the view for standard output: lines if `plain`; `verbose` adds lines."""
         if as_json:
             return self.json_view(JsonView)
-        if sys.stdout.isatty() and not plain:
-            from rich.console import Console
+        if not plain and (console := terminal()) is not None:
+            from bt_actions.cli.views.live import LiveView
 
-            from bt_actions.cli.views.live import LiveView, suits
-
-            console = Console(highlight=False, markup=False, emoji=False)
-            if suits(console):
-                return LiveView(self.state, console)
+            return LiveView(self.state, console)
         return LineView(self.state, sys.stdout, verbose=verbose)
 
     def json_view(self, kind: type[Json]) -> Json:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from bt_actions.cli.streams.results import results
 from bt_actions.utilities.shorten import fit
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 class OutputLost(Exception):
@@ -54,6 +57,16 @@ def note(message: str, end: str = "\n") -> None:
         print("\n".join(map(fit, message.split("\n"))), file=sys.stderr, flush=True, end=end)
     except (OSError, ValueError):
         _discard(sys.stderr)
+
+
+def terminal() -> Console | None:
+    """Return standard output's terminal, where that can be drawn on."""
+    if not sys.stdout.isatty():
+        return None
+    from rich.console import Console
+
+    console = Console(highlight=False, markup=False, emoji=False)
+    return None if console.is_dumb_terminal else console
 
 
 def columns(stream: TextIO) -> int:

@@ -18,8 +18,8 @@ def choose(
     branch leaves another one.
 
     Running nodes come first. Then, of the nodes above them, those that tell running branches apart,
-    then the others, then the next siblings, then the nearest nodes in the tree. One line is kept
-    for the number of nodes left out. The cost does not grow with the tree.
+    then the others, then the nodes behind each running one, then those before the first. One line
+    is kept for the number of nodes left out. The cost does not grow with the tree.
     """
     if len(nodes) <= most:
         return nodes, 0, {}
@@ -30,13 +30,11 @@ def choose(
         (chain[0] for chain in chains),
         (forks[chain[0]] for chain in chains if chain[0] in forks),
         (each for rank in itertools.zip_longest(*chains) for each in rank if each is not None),
-        (after for chain in chains for each in chain for after in _after(state, each)),
-        _around(nodes, position[chains[0][0]] if chains else 0, 8 * most),
+        _near(nodes, [position[chain[0]] for chain in chains] or [0], most),
     ):
         if len(chosen) >= most - 1:
             break
-        if node in position:
-            chosen.add(node)
+        chosen.add(node)
     shown = sorted(chosen, key=position.__getitem__)
     unseen = {tip: fork for tip, fork in forks.items() if fork not in chosen}
     return shown, len(nodes) - len(shown), unseen
@@ -63,19 +61,9 @@ def _fork_of(chains: list[list[int]]) -> dict[int, int]:
     return forks
 
 
-def _around(nodes: list[int], at: int, most: int) -> Iterator[int]:
-    """Yield nodes by their distance from place `at`, later ones first."""
-    for distance in range(1, most):
-        if at + distance < len(nodes):
-            yield nodes[at + distance]
-        if at - distance >= 0:
-            yield nodes[at - distance]
-
-
-def _after(state: State, node: int) -> list[int]:
-    """Return the siblings behind a node."""
-    parent = state.nodes[node].node.parent
-    if parent is None:
-        return []
-    siblings = state.nodes[parent].children
-    return siblings[siblings.index(node) + 1 :]
+def _near(nodes: list[int], places: list[int], most: int) -> Iterator[int]:
+    """Yield the nodes behind each place in turn, then those before the first, the nearest first."""
+    for distance in range(most):
+        yield from (nodes[at + distance] for at in places if at + distance < len(nodes))
+    for at in range(places[0] - 1, max(-1, places[0] - most), -1):
+        yield nodes[at]

@@ -18,7 +18,6 @@ from bt_actions.events import (
     NodeChanged,
     RoundBegan,
     RunBegan,
-    StopWanted,
     TickLasts,
     Value,
 )
@@ -27,7 +26,7 @@ from bt_actions.story.actions import ActionStory
 from bt_actions.story.failures import Failure
 from bt_actions.story.state import State
 from bt_actions.story.why import why
-from bt_actions.story.words import NO_END, stopping_text
+from bt_actions.story.words import NO_END
 from bt_actions.utilities.plain_text import as_json
 
 KINDS = {
@@ -65,8 +64,6 @@ class JsonView(View):
                 )
             case _ if type(event) in KINDS:
                 self._of_node(event)
-            case StopWanted(abandons=False):
-                self.say(stopping_text(self._state))
 
     def say(self, text: str) -> None:
         """Write `text` as a note."""

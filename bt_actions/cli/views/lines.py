@@ -7,17 +7,7 @@ from typing import TextIO
 from py_trees.common import Status
 
 from bt_actions.cli.views.view import View
-from bt_actions.events import (
-    AttemptEnded,
-    Event,
-    GoalChanged,
-    NodeChanged,
-    NodesRemoved,
-    RoundBegan,
-    RunBegan,
-    StopWanted,
-    TickLasts,
-)
+from bt_actions.events import AttemptEnded, Event, GoalChanged, NodeChanged, RoundBegan, TickLasts
 from bt_actions.events.kinds import LEFT_OUT
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import DONE, ActionStory
@@ -25,7 +15,7 @@ from bt_actions.story.doing import doing
 from bt_actions.story.state import OVER, NodeStory, State
 from bt_actions.story.values import round_text
 from bt_actions.story.why import attempt_text
-from bt_actions.story.words import goal_text, last_words, stopping_text, troubles
+from bt_actions.story.words import goal_text, last_words, troubles
 from bt_actions.utilities.plain_text import clean
 from bt_actions.utilities.shorten import fit
 
@@ -53,11 +43,6 @@ class LineView(View):
     def event(self, event: Event) -> None:
         """Write a line where `event` changes an earlier line."""
         match event:
-            case RunBegan():
-                self._nodes.clear()
-            case NodesRemoved():
-                for node in event.nodes:
-                    self._passing.pop(node, None)
             case NodeChanged():
                 self._node(event)
             case TickLasts():
@@ -72,13 +57,11 @@ class LineView(View):
                 for node in self._state.below(event.node):
                     self._nodes.pop(node, None)
                 self._line(event.at.steady, "round", event.node, round_text(event))
-            case StopWanted(abandons=False):
-                self._write(stopping_text(self._state))
 
     def due(self, now: float) -> None:
         """Write a line for each state that has lasted long enough."""
         for key, since in list(self._passing.items()):
-            if now - since >= LASTING:
+            if now - since >= LASTING and key in self._state.nodes:
                 at, action = self._passing.pop(key) + LASTING, self._state.action(key)
                 does = doing(self._state, self._state.nodes[key], at)
                 self._line(at, "goal", key, goal_text(action) if action.outcome else str(does))
@@ -134,21 +117,18 @@ class LineView(View):
             again = f"; again in {event.again_in:.1f} s" if event.again_in else ""
             self._line(event.at.steady, "goal", event.node, text + again)
 
-    def say(self, text: str) -> None:
-        """Write `text` on a line of its own."""
-        self._write(text)
-
     def finish(self) -> None:
         """Write the table of actions, the world's verdict and the summary."""
         for line in last_words(self._state):
-            self._write(line)
+            self.say(line)
 
     def _line(self, at: float, what: str, node: int, said: str) -> None:
         text = clean(": ".join(filter(None, [" / ".join(self._state.path(node)), said])))
-        self._write(f"{max(0.0, at - self._state.started):8.2f} s  {what:<8} {text}")
+        self.say(f"{max(0.0, at - self._state.started):8.2f} s  {what:<8} {text}")
 
-    def _write(self, line: str) -> None:
-        self._out.write(f"{fit(line)}\n")
+    def say(self, text: str) -> None:
+        """Write `text` on a line of its own."""
+        self._out.write(f"{fit(text)}\n")
         self._out.flush()
 
 

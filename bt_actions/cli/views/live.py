@@ -14,11 +14,11 @@ from rich.text import Text
 from bt_actions.cli.streams.stderr import CaughtStderr
 from bt_actions.cli.views.choosing import choose
 from bt_actions.cli.views.view import View
-from bt_actions.events import Event, NodeChanged, RoundBegan, RunBegan, StopWanted, TickLasts
+from bt_actions.events import Event, NodeChanged, RoundBegan, RunBegan, TickLasts
 from bt_actions.events.kinds import NodesAdded, NodesRemoved
 from bt_actions.story.doing import doing
 from bt_actions.story.state import OVER, NodeStory, State
-from bt_actions.story.words import goal_text, judged, last_words, stopping_text
+from bt_actions.story.words import goal_text, judged, last_words
 from bt_actions.utilities.plain_text import clean
 
 _STYLES = {
@@ -42,9 +42,20 @@ BAR = 20
 """Columns of the progress bar where there is room."""
 
 
-def suits(console: Console) -> bool:
-    """Return whether `console` is a terminal that can be drawn on."""
-    return console.is_terminal and not console.is_dumb_terminal
+def joined(lines: list[Text], console: Console) -> Text:
+    """Return a picture of lines, each cut to the width of a terminal."""
+    for line in lines:
+        line.no_wrap = True
+        cut(line, console, max(1, console.width - 1))
+    return Text("\n").join(lines)
+
+
+def cut(text: Text, console: Console, width: int) -> None:
+    """Cut `text` to a width, with an ellipsis at its end."""
+    if text.cell_len > width:
+        dots = "..." if console.options.ascii_only else "…"
+        text.truncate(max(0, width - len(dots)), overflow="crop")
+        text.append(dots[:width])
 
 
 def drawing(console: Console, *, whole: bool = False) -> Live:
@@ -76,7 +87,6 @@ class LiveView(View):
         self._running: set[int] = set()
         self._done: set[int] = set()
         self._last: dict[int, Status] = {}
-        self._stopping = False
         self._passing: list[Text] = []
         self._stderr = CaughtStderr()
         self._live = drawing(console, whole=whole)
@@ -99,8 +109,6 @@ class LiveView(View):
                 for node in self._state.below(event.node):
                     self._last.pop(node, None)
                     self._done.discard(node)
-            case StopWanted(abandons=False):
-                self.say(stopping_text(self._state))
 
     def _node_changed(self, event: NodeChanged) -> None:
         story, status = self._state.nodes[event.node], event.status
@@ -123,11 +131,10 @@ class LiveView(View):
         self._let_by()
         height = self._console.height - 1
         lines = self._lines(now, max(1, height // 3, height - SCROLLS))
-        self._live.update(Text("\n").join(lines), refresh=True)
+        self._live.update(joined(lines, self._console), refresh=True)
 
     def say(self, text: str) -> None:
         """Let `text` scroll by."""
-        self._stopping = True
         self._passing.append(Text(text, style="yellow"))
 
     def finish(self) -> None:
@@ -186,26 +193,14 @@ class LiveView(View):
             lines.append(self._node(now, node, len(above), mark))
             above.append(node)
         if hidden and most > 1:
-            more = f"{self._dots} {hidden} more node{'s' if hidden > 1 else ''}"
+            dots = "..." if self._plain else "…"
+            more = f"{dots} {hidden} more node{'s' if hidden > 1 else ''}"
             lines.append(Text(more, style="dim"))
-        for line in lines:
-            line.no_wrap = True
-            self._fit(line, self._width)
         return lines
 
     @property
     def _width(self) -> int:
         return max(1, self._console.width - 1)
-
-    @property
-    def _dots(self) -> str:
-        return "..." if self._plain else "…"
-
-    def _fit(self, text: Text, width: int) -> None:
-        """Cut `text` to a width, with an ellipsis at its end."""
-        if text.cell_len > width:
-            text.truncate(max(0, width - len(self._dots)), overflow="crop")
-            text.append(self._dots[:width])
 
     def _node(self, now: float, node: int, depth: int, mark: str) -> Text:
         story = self._state.nodes[node]
@@ -217,7 +212,7 @@ class LiveView(View):
         text.append(f"{self._glyph(status)} ", style=_STYLES[status])
         for name in filter(None, (mark, story.node.name)):
             said = Text(clean(name), style="dim" if status is Status.INVALID else "")
-            self._fit(said, max(12, self._width // (4 if mark else 2)))
+            cut(said, self._console, max(12, self._width // (4 if mark else 2)))
             text.append_text(said)
             text.append(": " if name is mark else "")
         if status is Status.RUNNING:
@@ -231,18 +226,18 @@ class LiveView(View):
     def _progress(self, now: float) -> Text:
         done, leaves = len(self._done), max(1, self._leaves)
         elapsed = f"  {self._state.since_began(now):.1f} s"
-        keys = f"  Ctrl-C {'again leaves' if self._stopping else 'cancels'}"
+        keys = f"  Ctrl-C {'cancels' if self._state.stop is None else 'again leaves'}"
         counts = (f" {done} of {self._leaves} leaves", f" {done}/{self._leaves}", "")
         count = next(c for c in counts if not c or len(c + elapsed + keys) <= self._width)
         width = max(0, min(BAR, self._width - len(count + elapsed + keys)))
-        filled = width * min(done, leaves) // leaves
+        bar = self._bar(width, min(done, leaves) / leaves)
+        return bar.append(count if width else count.lstrip()).append(elapsed + keys, "dim")
+
+    def _bar(self, width: int, share: float) -> Text:
+        """Return a bar of some columns, of which a share is full."""
         full, empty = ("=", "-") if self._plain else ("━", "─")
-        return Text.assemble(
-            (full * filled, "green"),
-            (empty * (width - filled), "dim"),
-            count if width else count.lstrip(),
-            (elapsed + keys, "dim"),
-        )
+        filled = int(width * share)
+        return Text.assemble((full * filled, "green"), (empty * (width - filled), "dim"))
 
     def _glyph(self, status: Status) -> str:
         return _GLYPHS[status][self._plain]

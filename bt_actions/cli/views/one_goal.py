@@ -6,12 +6,12 @@ from dataclasses import replace
 from typing import TextIO
 
 from bt_actions.cli.views.view import View
-from bt_actions.events import Event, GoalChanged, StopWanted
+from bt_actions.events import Event, GoalChanged
 from bt_actions.goals.policy import End, Outcome
 from bt_actions.story.actions import ActionStory
 from bt_actions.story.state import State
 from bt_actions.story.values import feedback_text
-from bt_actions.story.words import goal_text, left_open, result_lines, stopping_text
+from bt_actions.story.words import goal_text, left_open, result_lines
 from bt_actions.utilities.shorten import fit
 
 
@@ -29,14 +29,12 @@ class GoalView(View):
 
     def event(self, event: Event) -> None:
         """Write the state of the goal, where that has changed."""
-        if isinstance(event, StopWanted) and not event.abandons:
-            self._line(stopping_text(self._state))
         if not isinstance(event, GoalChanged) or event.outcome is not None:
             return
         text = goal_text(self._state.action(event.node))
         if text != self._last:
             self._last = text
-            self._line(text)
+            self.say(text)
 
     def frame(self, now: float) -> None:
         """Show the latest feedback."""
@@ -46,25 +44,21 @@ class GoalView(View):
                 self._last_feedback = text
                 self._show_feedback(text)
 
-    def say(self, text: str) -> None:
-        """Write `text` on a line of its own."""
-        self._line(text)
-
     def finish(self) -> None:
         """Write the result and the outcome."""
         state, ended = self._state, self._state.ended
         assert ended is not None
         for action in state.actions:
             for line in self.result_lines(action):
-                self._line(line)
+                self.say(line)
         for action in state.actions:
             reason = action.latest.latest.reason if action.latest is not None else ""
             if ended.cause and action.outcome is Outcome.CANCELED:
                 reason = ended.cause  # here is no tree that could have interrupted it
             told = goal_text(replace(action, reason=reason))  # the result was told above
-            self._line(f"{told}, after {action.seconds(state.latest):.2f} s")
+            self.say(f"{told}, after {action.seconds(state.latest):.2f} s")
         for line in left_open(state):
-            self._line(line)
+            self.say(line)
 
     def feedback_text(self, action: ActionStory) -> str:
         """Return the latest feedback on one line."""
@@ -79,17 +73,18 @@ class GoalView(View):
     def close(self) -> None:
         """Leave the line that feedback was drawn on."""
         if self._drawn:
-            self._line("")
+            self.say("")
 
     def _show_feedback(self, text: str) -> None:
         if not self._in_place:
-            self._line(f"  {text}")
+            self.say(f"  {text}")
             return
         self._out.write(f"\r\x1b[K  {text}")
         self._out.flush()
         self._drawn = True
 
-    def _line(self, text: str) -> None:
+    def say(self, text: str) -> None:
+        """Write `text` on a line of its own."""
         start = "\r\x1b[K" if self._drawn else ""
         self._drawn = False
         self._out.write(f"{start}{fit(text)}\n" if text else start)

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.text import Text
 
 from bt_actions.cli.driving.player import Player
-from bt_actions.cli.views.live import BAR, SCROLLS, LiveView
+from bt_actions.cli.views.live import BAR, SCROLLS, LiveView, joined
 from bt_actions.story.state import OVER, State
 from bt_actions.story.words import last_words
 
@@ -23,7 +23,7 @@ class PlayedView(LiveView):
 
     def __init__(self, console: Console) -> None:
         super().__init__(State(), console, whole=True)
-        self._drawn: list[Text] = []
+        self._drawn = Text()
 
     def show(self, player: Player) -> None:
         """Draw, where the picture changes."""
@@ -44,20 +44,16 @@ class PlayedView(LiveView):
         tree = self._lines(player.now, most + 1)[1:] if most else []
         above = above[max(0, len(above) + len(tree) - room) :]
         blank = [Text()] * (room - len(above) - len(tree))
-        lines = [*blank, *above, *tree, self._line_of(player)]
-        for line in lines:
-            line.no_wrap = True
-            self._fit(line, self._width)
-        if lines != self._drawn:
-            self._drawn = lines
-            self._live.update(Text("\n").join(lines), refresh=True)
+        picture = joined([*blank, *above, *tree, self._line_of(player)], self._console)
+        if picture != self._drawn:
+            self._drawn = picture
+            self._live.update(picture, refresh=True)
 
     def _line_of(self, player: Player) -> Text:
         """Return the player's moment, its speed, and as many of its keys as there is room for."""
         length = player.last - player.first
         share = (player.now - player.first) / length if length > 0.0 else 1.0
-        full, empty, times = ("=", "-", "x") if self._plain else ("━", "─", "×")
-        across, along = ("left/right", "up/down") if self._plain else ("←→", "↑↓")
+        across, along, times = ("left/right", "up/down", "x") if self._plain else ("←→", "↑↓", "×")
         position = f" {_clock(player.now - player.first)} of {_clock(length)}"
         speed = f"  {times}{player.speed:g}"
         said = player.said or (player.is_paused and "paused") or ""
@@ -67,14 +63,8 @@ class PlayedView(LiveView):
         left = self._width - len(position + speed + said)
         keys = next((f"  {each}" for each in (long, short) if len(each) + 2 <= left), "")
         width = max(0, min(BAR, left - len(keys)))
-        text = Text()
-        text.append(full * round(width * share), style="green")
-        text.append(empty * (width - round(width * share)), style="dim")
-        text.append(position if width else position.lstrip())
-        text.append(speed, style="bold")
-        text.append(said, style="yellow")
-        text.append(keys, style="dim")
-        return text
+        text = self._bar(width, share).append(position if width else position.lstrip())
+        return text.append(speed, "bold").append(said, "yellow").append(keys, "dim")
 
 
 def _clock(seconds: float) -> str:

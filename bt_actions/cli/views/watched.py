@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.text import Text
 
 from bt_actions.cli.streams.writing import write
-from bt_actions.cli.views.live import drawing
+from bt_actions.cli.views.live import drawing, joined
 from bt_actions.recording.watching import Seen
 from bt_actions.story.doing import doing
 from bt_actions.utilities.plain_text import clean
@@ -100,12 +100,7 @@ class WatchedScreen:
             more = f"{len(lines) - room + 1} more lines"
             lines = [*lines[: room - 1], Text(more, style="dim")]
         lines.append(Text("Ctrl-C ends", style="dim"))
-        for line in lines:
-            line.no_wrap = True
-            line.truncate(
-                self._console.width - 1, overflow="crop" if self._is_plain else "ellipsis"
-            )
-        self._live.update(Text("\n").join(lines), refresh=True)
+        self._live.update(joined(lines, self._console), refresh=True)
 
     def close(self) -> None:
         """Take the drawing away."""
