@@ -115,7 +115,8 @@ Expressions have Python's comparisons, arithmetic, `and`, `or`, `not`, `in`, fie
 slices (`$list[-1]`, `$list[1:3]`), `1 if $empty else 2`, `true` and `false`, and constants
 (`MoveRobot.Result.STATUS_FAULT`). A plus sign also joins two texts, and two lists:
 `= $names + ['part ' + str($count)]`. In `expect`, `save` and `when` the bare name `result` is the
-result, and in a `run_tree` the name `outputs` has the outputs of the tree. In `until` and `save` of
+result, and in a `run_tree` the name `outputs` has the outputs of the tree. In `until` and
+`save_feedback` of an action, `feedback` is the feedback. In `until` and `save` of
 `wait_for_message`, `message` is the message. A float32 has the value of its shortest decimal: 0.7,
 not 0.699999988. The functions are:
 
@@ -211,6 +212,12 @@ replacement uses no attempt. When a new goal cannot be built, the old goal runs 
 refuses a new goal, the leaf cancels the old one, and the attempt ends. At most two goals live at
 once: a further change waits, and the newest change counts. On a `subtree`, `on_change: pass` passes
 changed inputs on.
+"""
+SAVE_FEEDBACK = """\
+Each feedback writes its variables as the feedback comes, also the feedback of a goal that fails.
+Before the first feedback a variable has the value that it had, or none (`known($name)` asks). A
+part that a feedback lacks leaves its variable as it was. The leaf asks `until` before the write, so
+`until: feedback.left > $left` compares with the feedback before.
 """
 QOS = """\
 ### `qos`
@@ -386,6 +393,7 @@ def yaml_page() -> str:
     lines += part("`namespace`", NAMESPACE, "namespaces")
     lines += ["### `busy`", "", BUSY + "\n".join(busy()), ""]
     lines += ["### `on_change` of an action", "", *ON_CHANGE.split("\n"), example("guided"), ""]
+    lines += part("`save_feedback` of an action", SAVE_FEEDBACK.rstrip("\n"), "on_the_way")
     lines += [*QOS.split("\n")]
     lines += record("`timeout` of an action", "`30 s` is short for `{result: 30 s}`.", TIMEOUT)
     lines += record("`retry` of an action", retry_text(), RETRY)

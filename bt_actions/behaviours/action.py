@@ -38,9 +38,6 @@ if TYPE_CHECKING:
     from bt_actions.traffic.state import Endpoint, GoalHandle
 
 
-_PLAIN = {bool, int, float, str}
-
-
 @dataclass(frozen=True, slots=True)
 class Progress:
     """The work of an action at this moment."""
@@ -77,6 +74,8 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
             makes the result an unexpected one.
         save_on_failure: as `save`, for a visit that fails; `outcome` says why. A value that the
             failure lacks stays that of an empty result, which a visit begins with.
+        save_feedback: as `save`, of each feedback message, behind the question of `until`. A value
+            that a message lacks stays.
         busy: what to do when the resources are taken: wait, replace, fail or share.
         resources: the names that the goal occupies, in place of the action server; named as
             servers are, so a relative name is expanded with the node's namespace.
@@ -108,6 +107,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         expect: Callable[[Any], bool] | str | None = None,
         save: Mapping[str, str | Callable[[Any], Any]] | None = None,
         save_on_failure: Mapping[str, str | Callable[[Any], Any]] | None = None,
+        save_feedback: Mapping[str, str | Callable[[Any], Any]] | None = None,
         until: Callable[[Any], bool] | str | None = None,
         busy: Busy | str = "wait",
         resources: Iterable[str] | None = None,
@@ -135,9 +135,9 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         self._of_failure = None
         if save_on_failure:
             self._of_failure = Reading(None, save_on_failure, names=of_failure)
-        self._until = None
-        if until is not None:
-            self._until = Reading(until, {}, names=of_feedback, what="feedback")
+        self._of_feedback = None
+        if save_feedback or until is not None:
+            self._of_feedback = Reading(until, save_feedback or {}, names=of_feedback)
         self._reading = Reading(expect, self.save, self.retry.when, self.names)
         self._shown: tuple[tuple[Any, Any, Any], str] = (None, None, None), ""
         self._handle: GoalHandle | None = None
@@ -240,8 +240,10 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
                 fill(action.Goal, self.goal)
             except MessageError as error:
                 raise ValueError(f"{self.name}: goal: {error}") from error
-        for each in (self._reading, self._of_failure):
-            if each is not None and (wrong := each.set_up(action.Result)):
+        result, feedback = action.Result, action.Feedback
+        parts = (self._reading, result), (self._of_failure, result), (self._of_feedback, feedback)
+        for each, part in parts:
+            if each is not None and (wrong := each.set_up(part)):
                 raise ValueError(f"{self.name}: {wrong}")
         if self._of_failure is not None:
             self._of_failure.save((action.Result(), ""))
@@ -283,7 +285,8 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
                 message = handle.feedback.popleft()
                 if self.on_feedback is not None and not self._is_over():
                     self.on_feedback(message)
-                if self._until is not None and not (decided or self._until.read(message)):
+                news = self._of_feedback
+                if news is not None and news.is_enough(message) and not decided:
                     self._is_enough = True
                     backend.traffic.interrupt(handle)
             if self._is_over():
@@ -392,7 +395,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
             self.resources,
             busy or self.busy,
             attempt=self._attempts.attempt,
-            keeps_feedback=self.on_feedback is not None or self._until is not None,
+            keeps_feedback=self.on_feedback is not None or self._of_feedback is not None,
             accounts_for_all=self.settles,
         )
         return self._handle
@@ -405,11 +408,6 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         """Return whether this attempt is over and in the history."""
         history = self.history  # a new visit has a new one
         return bool(history) and history[-1].goal is handle.goal
-
-    def _is_plain(self) -> bool:
-        """Return whether the goal becomes a message without code of the user's."""
-        goal = self.goal
-        return type(goal) is dict and all(type(each) in _PLAIN for each in goal.values())
 
     def _make_message(self) -> Any:
         action: Any = self.action_type

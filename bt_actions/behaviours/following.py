@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from bt_actions.traffic.state import GoalHandle
 
 ON_CHANGE = ("ignore", "replace", "cancel")
+_PLAIN = {bool, int, float, str}
 
 
 class Following:
@@ -40,6 +41,11 @@ class Following:
     def _data(self) -> object:
         """Compute the data of a goal."""
         return resolve(self.goal() if callable(self.goal) else self.goal)
+
+    def _is_plain(self) -> bool:
+        """Return whether the goal becomes a message without code of the user's."""
+        goal = self.goal
+        return type(goal) is dict and all(type(each) in _PLAIN for each in goal.values())
 
     def _is_outdated(self, newest: GoalHandle, backend: Backend) -> bool:
         """Return whether to send another goal now in the place of one that executes.

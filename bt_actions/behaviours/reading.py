@@ -127,10 +127,12 @@ class Reading:
         for what, expression in self._written:
             for node in ast.walk(expression.tree):
                 match node:
-                    case ast.Attribute(value=ast.Name(id="result"), attr=name):
+                    case ast.Attribute(
+                        value=ast.Name(id=("result" | "feedback") as root), attr=name
+                    ):
                         if not hasattr(result_type, name):  # nor a constant
                             hint = did_you_mean(name, result_type.get_fields_and_field_types())
-                            return f"{what}: result has no field {name!r}{hint}"
+                            return f"{what}: {root} has no field {name!r}{hint}"
         return ""
 
     def save(self, result: Any) -> None:
@@ -140,6 +142,15 @@ class Reading:
             with contextlib.suppress(ValueError):
                 saved[name] = value(result)
         write(saved)
+
+    def is_enough(self, feedback: Any) -> bool:
+        """Return whether a condition holds, if there is one; then save what the feedback has."""
+        try:
+            return self._expect is not None and bool(self._expect(feedback))
+        except ExpressionError:
+            return False
+        finally:
+            self.save(feedback)
 
     def seen(self, result: Any) -> dict[str, object]:
         """Return the values of the names in `expect`, where the last result did not meet it.

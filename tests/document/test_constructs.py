@@ -319,6 +319,42 @@ def test_feedback_that_is_enough_ends_a_goal_and_is_a_success(
     assert 1.0 < runner.now < 2.0
 
 
+def test_what_feedback_tells_is_kept_while_a_goal_runs_and_when_it_has_failed(load: Load) -> None:
+    network = VirtualNetwork()
+    script = Script(
+        duration=4.0, feedback=lambda goal, done: MoveRobot.Feedback(current_pose=4.0 * done)
+    )
+    ScriptedServer(network, MoveRobot, "lift", script, faults=["lift:1:abort"])
+    outputs = "{before: bool, lacked: bool, failed: float64, seen: float64, at: float64}"
+    root = load(
+        HEAD.replace("tree: t", f"tree: t\noutputs: {outputs}")
+        + """
+  sequence: S
+  children:
+    - set: {before: = known($at), zero: 0.0}
+    - force_success: F
+      child:
+        lift: Up
+        save_feedback: {at: feedback.current_pose, no: feedback.current_pose / $zero}
+    - set: {failed: $at, lacked: = not known($no)}
+    - set: {at: 0.0}
+    - parallel: P
+      policy: one
+      children:
+        - {lift: Up, save_feedback: {at: feedback.current_pose}}
+        - {sequence: T, children: [{wait_until: $at > 3.0}, {set: {near: $at}}]}
+    - {lift: Up, until: feedback.current_pose < $at, save_feedback: {at: feedback.current_pose}}
+"""
+    )
+    runner = VirtualRunner(root, network)
+    assert runner.run() is Status.SUCCESS
+    told = tree_outputs(root)
+    assert (told["before"], told["lacked"]) == (False, True)
+    assert 0.0 < told["failed"] < 4.0
+    assert 3.0 < told["near"] < 3.5
+    assert told["at"] < 1.0, "until is asked first"
+
+
 def test_a_topic_with_a_default_has_a_value_from_the_beginning(
     load: Load, network: VirtualNetwork
 ) -> None:

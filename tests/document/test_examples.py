@@ -288,6 +288,14 @@ def test_a_robot_goes_no_farther_than_it_may_and_tells_why_it_failed(around: Sur
     assert 4.0 < around.pose() < 5.0
 
 
+def test_a_gripper_opens_on_the_way(around: Surroundings) -> None:
+    runner = VirtualRunner(example("on_the_way"), around.network)
+    assert runner.run() is Status.SUCCESS
+    assert around.pose() == pytest.approx(4.0, abs=0.02)
+    ended = [name for name, _ in runner.outcomes]
+    assert ended == ["Open", "To the part"]
+
+
 def test_a_class_of_py_trees_is_a_kind(around: Surroundings) -> None:
     root = example("own_kinds")
     assert around.run(root) is Status.SUCCESS

@@ -81,6 +81,12 @@ def _parts(cls: type | None, interface: Interface) -> tuple[FieldType | None, Ty
     return Message(interface.part(cls, interface.sent)), {interface.root: received, **more}
 
 
+def _feedback(cls: type | None) -> FieldType | None:
+    """Return the type of an action's feedback; None of what is no action, or not known."""
+    feedback = getattr(cls, "Feedback", None)
+    return None if feedback is None else Message(feedback)
+
+
 def _all_computed(
     kind: FieldType, value: object, types: MappingType[int, FieldType | None]
 ) -> bool:
@@ -217,9 +223,11 @@ class Checker:
             return None
         return self.interface(name, interface.kind, node.written.get("type", node.key))
 
-    def received(self, node: TreeNode) -> FieldType | None:
-        """Return the type of what a node receives: a result, an answer, a message."""
+    def received(self, node: TreeNode, root: str = "") -> FieldType | None:
+        """Return the type of what a node receives: a result, feedback, an answer, a message."""
         cls, interface = self.class_of(node), node.kind.interface
+        if root == "feedback":
+            return _feedback(cls)
         return _parts(cls, interface)[1][interface.root] if interface is not None else None
 
     def declared_type(self, declared: Declared | None) -> FieldType | None:
@@ -252,7 +260,7 @@ class Checker:
             return TEXT
         if not isinstance(value, Computed):
             return type_of_literal(value) if write.root != "item of" else None
-        roots = {write.root: self.received(node)} if write.root else {}
+        roots = {write.root: self.received(node, write.root)} if write.root else {}
         kind = self.infer(value.expression, roots, node)[0]
         if write.root == "item of":
             return kind.item if isinstance(kind, Listing) else None
@@ -268,27 +276,26 @@ class Checker:
         """Check the settings that all kinds with an interface share."""
         key = interface.fields
         asked, roots = _parts(cls, interface)
+        fed: Types = {"feedback": _feedback(cls)}
         if key in values and key in written:
             self.value(asked, values[key], written[key])
         self.condition(values.get("expect"), roots)
         if "until" in values:
-            until = roots
-            if interface.kind == "action":
-                until = {"feedback": None if cls is None else Message(cls.Feedback)}  # type: ignore[attr-defined]
-            self.condition(values["until"], until)
+            self.condition(values["until"], fed if interface.kind == "action" else roots)
         if "retry" in values:
             self.condition(when_of(values), roots)
         for key in SAVES:
             if key not in values:
                 continue
-            saved = roots if key == "save" else {**roots, "outcome": TEXT}
+            saved = {"save": roots, "save_feedback": fed}.get(key, {**roots, "outcome": TEXT})
             for name, place in table_of(values[key]).items():
                 if isinstance(place, Computed):
                     self.assigns(name, self.expression(place, saved), place.node)
-        own, failed = (table_of(values.get(key)) for key in SAVES)
-        for name in own.keys() & failed.keys() if failed else ():
-            text = f"{name!r} is saved of a success, too: nobody could tell which it is of"
-            self.source.report("BT216", span_of(written[SAVES[1]]), text)
+        own, *others = (table_of(values.get(key)) for key in SAVES)
+        for key, other in zip(SAVES[1:], others, strict=True):
+            for name in own.keys() & other.keys() if other else ():
+                text = f"{name!r} is saved of a success, too: nobody could tell which it is of"
+                self.source.report("BT216", span_of(written[key]), text)
 
     def assigns(self, name: str, kind: FieldType | None, node: Node) -> None:
         """Check that a value of a type may be written to a variable."""

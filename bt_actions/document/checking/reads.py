@@ -77,7 +77,9 @@ class _Order:
             return _SILENT
         kind = node.kind
         if not node.children:
-            return own, own if kind.includes else _NOTHING
+            writes = self._checker.writes[id(node)]
+            meanwhile = {one.name for one in writes if one.root == "feedback"}
+            return own, own if kind.includes else meanwhile
         if kind.again is End.SUCCESS:  # a read in its first round has nothing yet
             later |= self._below(node)
         elif (

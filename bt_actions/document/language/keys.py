@@ -83,6 +83,7 @@ POLICIES = (
     Key("busy", Choice(tuple(busy.value for busy in Busy)),
         "What to do when another goal has the server.", default="wait"),
 )  # fmt: skip
+FEEDBACK = frozenset({"feedback"})
 FAILED = frozenset({"result", "outcome"})
 SAVE_ON_FAILURE = Key(
     "save_on_failure", Table(Place(FAILED)),
@@ -90,7 +91,7 @@ SAVE_ON_FAILURE = Key(
 )  # fmt: skip
 DOING = (
     Key("goal", Values(), "The fields of the goal; other fields keep their defaults."),
-    Key("until", Condition(frozenset({"feedback"})),
+    Key("until", Condition(FEEDBACK),
         "A condition on the feedback: when it holds, the leaf cancels the goal and succeeds."),
     Key("on_change", Choice(("ignore", "replace", "cancel")),
         "The reaction to changed fields while the goal executes.",
@@ -100,6 +101,8 @@ DOING = (
         "A condition on the result of a goal that succeeded; else UNEXPECTED_RESULT."),
     Key("save", Table(Place(RESULT)), "Variables for parts of the result."),
     SAVE_ON_FAILURE,
+    Key("save_feedback", Table(Place(FEEDBACK)),
+        "Variables for parts of each feedback, as the feedback comes."),
     Key("resources", ListOf(Text("a text")),
         "The resources of the goal, in place of its server; relative names as those of servers.",
         default="the server's name"),

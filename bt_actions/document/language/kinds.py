@@ -200,7 +200,8 @@ NODE_KEYS = {*ACTION_KEYS, "child", "children"}
 Other keys that hold nodes may name an action. Beside a kind with such a key, the word is the key.
 """
 SINCE = dict.fromkeys(
-    ("if", "pipeline", "every", "in_turn", "on_change", "save_on_failure", *GATES), "0.2"
+    ("if", "pipeline", "every", "in_turn", "on_change", "save_on_failure", "save_feedback", *GATES),
+    "0.2",
 )
 """The version of bt_actions since which a word may name no action, where that is not the first."""
 

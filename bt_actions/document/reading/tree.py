@@ -199,7 +199,7 @@ def when_of(settings: object) -> object:
     return retry.get("when") if isinstance(retry, dict) else None
 
 
-SAVES = ("save", "save_on_failure")
+SAVES = ("save", "save_on_failure", "save_feedback")
 """The keys whose names an action's nodes write."""
 _Known = dict[tuple[int, str], dict[str, TreeNode]]
 
@@ -260,14 +260,15 @@ def writes_of(node: TreeNode, document: Document) -> list[Write]:
     if "save" not in kind.keys:
         return []
     declared = document.actions.get(node.alias) if node.alias is not None else None
-    root = interface.root if interface is not None else None
+    received = interface.root if interface is not None else None
     writes = []
     for key in SAVES:
         if key not in values and (declared is None or key not in declared.values):
             continue
+        root = "feedback" if key == "save_feedback" else received
         own, shared = table_of(values.get(key)), table_of(declared and declared.values.get(key))
         given = [pair for pair in shared.items() if pair[0] not in own]
-        writes += [Write(name, node, "", value, "result") for name, value in given]
+        writes += [Write(name, node, "", value, root) for name, value in given]
         writes += [Write(name, node, key, value, root) for name, value in own.items()]
     return writes
 

@@ -28,6 +28,7 @@ def _build(node: TreeNode, context: Context) -> Behaviour:
         goal=context.value(goal) if computed_in(goal) else goal,
         save=context.saved(settings.get("save"), reading.of_result, result),
         save_on_failure=context.saved(settings.get("save_on_failure"), reading.of_failure),
+        save_feedback=context.saved(settings.get("save_feedback"), reading.of_feedback),
         on_change=text_of(settings, "on_change") or "ignore",
         **shared,
     )
