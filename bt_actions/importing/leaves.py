@@ -44,6 +44,10 @@ class _Filled:
                 Node({kind: self._saves(value, kind) if kind in SAVES else self._fill(value)})
             )
         self._declare(kind, node)
+        if len(given.element.children) == 1:
+            node["child"] = given.only_child()
+        elif given.element.children:
+            node["children"] = given.children()
         for key, each in rest.items():
             filled = self._saves(each, key) if key in SAVES else self._fill(each)
             if key in ("server", "topic"):

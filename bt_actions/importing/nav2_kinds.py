@@ -9,6 +9,11 @@ from bt_actions.importing.report import Verdict
 from bt_actions.importing.scripts import Refused
 from bt_actions.importing.text import Node
 
+CANCELS = (
+    *("CancelControl", "CancelSpin", "CancelBackUp", "CancelDriveOnHeading", "CancelWait"),
+    *("CancelAssistedTeleop", "CancelComputeAndTrackRoute", "CancelFollowObject"),
+)
+"""Leaves that have a server cancel all of its goals."""
 _AT_ONCE = ("check", "set", "log", "success", "failure", "publish")
 
 
@@ -76,6 +81,13 @@ def _goal_updated(given: Given) -> Node:
     return node
 
 
+def _cancel(given: Given) -> Node:
+    for name in ("server_name", "service_name", "server_timeout"):
+        given.dropped(name, "nothing is sent")
+    given.differs("a leaf that is not ticked any more cancels its goal; goals of others go on")
+    return Node(success=given.name())
+
+
 def _selector(given: Given) -> Node:
     what = SELECTORS[given.kind].removeprefix("selected_")
     output = SELECTORS[given.kind]
@@ -119,6 +131,7 @@ NAV2: dict[str, Handler] = {
     "GoalUpdated": _goal_updated,
     "GlobalUpdatedGoal": _goal_updated,
     "GoalUpdatedController": _when_new,
+    **dict.fromkeys(CANCELS, _cancel),
     **dict.fromkeys(SELECTORS, _selector),
     "GoalUpdater": _goal_updater,
 }

@@ -194,6 +194,41 @@ def test_a_map_says_what_leaves_are(tmp_path: Path) -> None:
     assert [each for each in check_file(tmp_path / "Main.yaml") if each.severity == "error"] == []
 
 
+def test_a_map_names_kinds_that_hold_nodes(tmp_path: Path) -> None:
+    mapping = tmp_path / "map.yaml"
+    mapping.write_text(
+        "kinds:\n"
+        "  paced: {python: leaves.Paced, inputs: {by: float64, at: std_msgs/msg/Float64},"
+        " children: one}\n"
+        "  both: {python: leaves.Both, children: many}\n"
+        "topics: {at: {topic: at, type: std_msgs/msg/Float64}}\n"
+        "nodes:\n"
+        "  Controller: {paced: , with: {by: $distance, at: $at}, ports: {distance: float64}}\n"
+        "  Both: {both: }\n",
+        encoding="utf-8",
+    )
+    file = tmp_path / "main.xml"
+    file.write_text(
+        '<root BTCPP_format="4"><BehaviorTree ID="Main"><Controller distance="2.0"><Both>'
+        "<AlwaysSuccess/><AlwaysFailure/></Both></Controller></BehaviorTree></root>",
+        encoding="utf-8",
+    )
+    found = convert([file], read_map(mapping))
+    _, root = found.files["Main.yaml"].split("root:\n")
+    assert root == (
+        "  paced: Controller\n"
+        "  with: {by: 2.0, at: $at}\n"
+        "  child:\n"
+        "    both: Both\n"
+        "    children:\n"
+        "      - success: AlwaysSuccess\n"
+        "      - failure: AlwaysFailure\n"
+    )
+    assert [each.name for each in found.report.nodes()] == [
+        *("Controller", "Both", "AlwaysSuccess", "AlwaysFailure")
+    ]
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
