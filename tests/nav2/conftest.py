@@ -170,7 +170,8 @@ def start(
 @pytest.fixture(scope="module")
 def trees(start: Callable[..., Process], folder: Path) -> Path:
     """The folder with what `bt-actions import` has written."""
-    process = start("-c", MAIN, "import", *map(str, TREES), "-o", str(folder))
+    options = ["-o", str(folder), "--map", str(HERE / "leaves.yaml")]
+    process = start("-c", MAIN, "import", *map(str, TREES), *options)
     assert process.wait() == 0, process
     return folder
 

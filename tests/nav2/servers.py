@@ -1,7 +1,9 @@
 """Nav2's servers in a process of their own, which do what a script says: ``python -m``.
 
 Each line on stdin is a JSON object, from the name of a server to what the server does from now on:
-`seconds` that a goal takes, and `fails`, the error codes of the goals that come next (0: succeeds).
+`seconds` that a goal takes, `fails`, the error codes of the goals that come next (0: succeeds),
+`poses`, how many the paths have that are planned next, and `error`, how far left of its path the
+robot says that it is.
 Those that a line does not name do as they did in the beginning. Each line is answered on stdout,
 and the process ends when stdin is closed. The way that is to be followed takes its time in all,
 however often the path is replaced, as with a robot that goes on while a new path comes.
@@ -58,6 +60,8 @@ class Scripted(ScriptedServer):
 
     seconds: float
     fails: list[int]
+    poses: list[int]
+    error: float
     arrives: float | None = None
 
     def begin(self, goal: Any) -> Any:
@@ -80,8 +84,15 @@ class Scripted(ScriptedServer):
         if hasattr(result, "path"):  # which differs from those before
             goal = motion.goal
             result.path.header.frame_id = f"path {self._intake.count}"
-            result.path.poses = goal.goals.goals if hasattr(goal, "goals") else [goal.goal]
+            poses = goal.goals.goals if hasattr(goal, "goals") else [goal.goal]
+            result.path.poses = poses * (self.poses.pop(0) if self.poses else 1)
         return result
+
+    def feedback(self, motion: Any) -> Any:
+        made = self.action_type.Feedback()
+        if hasattr(made, "tracking_feedback"):
+            made.tracking_feedback.position_tracking_error = self.error
+        return made
 
     def on_request(self, request: Any) -> bool:
         if request.kind == "goal":
@@ -132,6 +143,7 @@ class Servers:
             said = script.get(name, {})
             server.seconds = said.get("seconds", ACTIONS[name][1])
             server.fails, server.arrives = said.get("fails", []), None
+            server.poses, server.error = said.get("poses", []), said.get("error", 0.0)
 
 
 def main() -> None:

@@ -259,6 +259,68 @@ def test_following_a_point_that_moves(nav2: Nav2) -> None:
     assert status(nav2, sent) == "canceled"
 
 
+def odometry(nav2: Nav2) -> Callable[[float, float], None]:
+    """Tell the trees where the robot is, and how fast."""
+    from nav_msgs.msg import Odometry
+
+    publisher = nav2.client.node.create_publisher(Odometry, "odom", 10)
+
+    def tell(x: float, speed: float) -> None:
+        message = Odometry()
+        message.pose.pose.position.x, message.twist.twist.linear.x = x, speed
+        publisher.publish(message)
+
+    return tell
+
+
+def test_replanning_each_metre(nav2: Nav2) -> None:
+    nav2.play(follow_path=LONG)
+    tell = odometry(nav2)
+    sent = nav2.send("replanning_distance", goal=to(9.0))
+    nav2.wait_for(FOLLOW)
+    nav2.client.until(lambda: tell(1.2, 0.5) or nav2.count(FOLLOW) == 2, "1.2 m from the start")
+    nav2.obey()
+    tell(2.1, 0.5)  # 0.9 m from there
+    nav2.client.until(lambda: tell(2.3, 0.5) or nav2.count(FOLLOW) == 3, "1.1 m from there")
+    assert status(nav2, sent) == "succeeded"
+    assert nav2.order == [PLAN, FOLLOW] * 3
+    assert follows_each_path(nav2)
+
+
+@pytest.mark.parametrize("speed", [0.5, 0.0])
+def test_replanning_the_more_often_the_faster_the_robot_is(nav2: Nav2, speed: float) -> None:
+    nav2.play(follow_path={"seconds": 2.6})
+    tell = odometry(nav2)
+    sent = nav2.send("replanning_speed", goal=to(9.0))
+    nav2.client.until(lambda: tell(0.0, speed) or sent.result_future.done(), "it arrives")
+    assert status(nav2, sent) == "succeeded"
+    assert nav2.count(PLAN) == 1 if speed == 0.0 else nav2.count(PLAN) >= 4
+    assert follows_each_path(nav2)
+
+
+def test_waiting_where_the_way_has_become_long_near_the_goal(nav2: Nav2) -> None:
+    nav2.play(follow_path={"seconds": 1.5}, **{PLAN: {"poses": [2, 8, 8, 8]}})
+    assert status(nav2, nav2.send("goal_patience", goal=to(2.0))) == "succeeded"
+    assert nav2.order[:4] == [PLAN, FOLLOW, PLAN, FOLLOW]
+    assert [len(goal["path"]["poses"]) for goal in nav2.goals(FOLLOW)][:2] == [2, 8]
+    assert nav2.ends.count("canceled") == 1
+    followed = [line.event for line in nav2.lines if line.server.endswith(FOLLOW)]
+    begun = [each for each in followed if each in ("received", "canceled")]
+    assert begun[:3] == ["received", "canceled", "received"], "one after the other"
+
+
+@pytest.mark.parametrize(
+    ("error", "end"), [(0.1, "succeeded"), (0.25, "failed"), (-0.25, "succeeded"), (-0.4, "failed")]
+)
+def test_following_as_long_as_the_robot_is_near_its_path(
+    nav2: Nav2, error: float, end: str
+) -> None:
+    nav2.play(follow_path={"seconds": 1.0 if end == "succeeded" else 60.0, "error": error})
+    assert status(nav2, nav2.send("bounds_check", goal=to(2.0))) == end
+    assert nav2.order == [PLAN, FOLLOW]
+    assert nav2.ends[1] == ("succeeded" if end == "succeeded" else "canceled")
+
+
 def test_driving_through_the_poses_that_lie_ahead(nav2: Nav2) -> None:
     nav2.play(follow_path={"seconds": 1.5}, **{THROUGH: {"fails": [NO_PATH]}})
     goals = {"goals": [to(0.5), to(2.0), to(3.0)]}
@@ -299,11 +361,13 @@ def test_the_package_has_the_types_and_fields_that_the_map_names() -> None:
         action = next((types[key] for key in node if key in types), None)
         if (full := node.get("type", action)) is None or "nav2_msgs" not in full:
             continue
-        asked, answered, *_ = (PACKAGE / _file(full)).read_text(encoding="utf-8").split("---\n")
-        has = [set(re.findall(r"^\S+ (\w+)", part, re.MULTILINE)) for part in (asked, answered)]
+        parts = (PACKAGE / _file(full)).read_text(encoding="utf-8").split("---\n")
+        has = [set(re.findall(r"^\S+ (\w+)", part, re.MULTILINE)) for part in parts]
+        fed = node.get("save_feedback", {}).values()
         saved = [*node.get("save", {}).values(), *node.get("save_on_failure", {}).values()]
         assert {*node.get("goal", {}), *node.get("request", {})} <= has[0], name
         assert {text.removeprefix("result.") for text in saved} <= has[1], name
+        assert {text.removeprefix("feedback.") for text in fed} <= {*has[-1]}, name
 
 
 def _file(full: str) -> str:
