@@ -128,7 +128,7 @@ class ActionBehaviour(Following, Connected["Endpoint"], Behaviour):
         self.resources = frozenset(resources or ())
         self.on_change = on_change
         if on_change != "ignore":
-            self.asks = lambda: True  # the fields are computed at each tick
+            self.asks = True  # the fields are computed at each tick
         self.on_feedback = on_feedback
         self.expect = expect
         self.save = dict(save or {})

@@ -209,7 +209,7 @@ class Subtree(Gate):
         self._end = end
         self._pass_on = pass_on
         if pass_on is not None:
-            self.asks = lambda: True  # the inputs are computed at each tick
+            self.asks = True  # the inputs are computed at each tick
 
     def initialise(self) -> None:
         try:

@@ -34,32 +34,28 @@ class _Gate:
         self, behaviour: Behaviour, only_if: Condition | None, only_while: Condition | None
     ) -> None:
         self._node, self._if, self._while = behaviour, only_if, only_while
-        self._tick = behaviour.tick
-        self._asks = getattr(behaviour, "asks", lambda: False)
+        self._tick = tick = behaviour.tick
+        self._asks = only_while is not None or getattr(behaviour, "asks", False)
+        """Whether a condition is asked at each tick, also while the node is not left out."""
         self._why = ""
         """The reason why the node was stopped, and is to be left out."""
         self._error = ""
         """The reason why the node was stopped, and is to fail."""
-        behaviour.left_out = False  # type: ignore[attr-defined]
-        behaviour.asks = self.asks  # type: ignore[attr-defined]
-        behaviour.tick = self.tick  # type: ignore[method-assign]
+        behaviour.left_out, behaviour.asks = False, self._asks  # type: ignore[attr-defined]
+        asked, running = self._asked, Status.RUNNING
 
-    def asks(self) -> bool:
-        """Return whether a condition is asked at each tick."""
-        left_out: bool = self._node.left_out  # type: ignore[attr-defined]
-        return self._while is not None or left_out or self._asks()
+        def unasked() -> Iterator[Behaviour]:
+            """Tick a running behaviour without another level of generators."""
+            return tick() if behaviour.status is running else asked()
 
-    def tick(self) -> Iterator[Behaviour]:
-        """Tick the behaviour, without another level of generators where no condition is asked."""
-        if self._while is None and self._node.status is Status.RUNNING:
-            return self._tick()
-        return self._asked()
+        behaviour.tick = unasked if only_while is None else asked  # type: ignore[method-assign]
 
     def _asked(self) -> Iterator[Behaviour]:
         node = self._node
         begins = node.status is not Status.RUNNING
         if begins:
             node.left_out = node.refused = False  # type: ignore[attr-defined]
+            node.asks = self._asks  # type: ignore[attr-defined]
             self._why = self._error = ""
         if not (self._why or self._error):
             self._ask(begins)
@@ -68,7 +64,7 @@ class _Gate:
             return
         if node.status is not Status.INVALID:
             node.stop(Status.INVALID)
-        if waits_for := still_ends(node):
+        if not begins and (waits_for := still_ends(node)):
             node.feedback_message, node.status = (
                 f"{self._why or self._error}; {waits_for}",
                 Status.RUNNING,
@@ -78,6 +74,7 @@ class _Gate:
             node.refused = True  # type: ignore[attr-defined]
         else:
             node.status = leave_out(node, self._why)
+            node.asks = True  # type: ignore[attr-defined]
         yield node
 
     def _ask(self, begins: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable
+from operator import attrgetter
 
 from py_trees import composites, decorators
 from py_trees.behaviour import Behaviour
@@ -29,6 +30,8 @@ _PASS_ON = {
 
 A class of ours says so by `passes_on`; a subclass of it may look at more.
 """
+_ASKS = attrgetter("asks")
+"""Whether a node asks something at each tick."""
 
 
 def tick_once(tree: BehaviourTree, changes: ChangeVisitor) -> None:
@@ -77,7 +80,7 @@ class ChangeVisitor(VisitorBase):
         self._visited: list[Behaviour] = []
         self._visited_before: list[Behaviour] = []
         self._kinds = {Behaviour}  # of visited nodes; any class, for a tree that shows nothing
-        self._asking: list[Callable[[], bool]] = []  # whether they ask at each tick
+        self._asking: list[Behaviour] = []  # visited nodes that may ask at each tick
         self._known: dict[Behaviour, Status] = {}  # at the last tick of each
         self._live: dict[Behaviour, None] = {}  # told of as RUNNING
         self._changed = False
@@ -134,7 +137,7 @@ class ChangeVisitor(VisitorBase):
         """Return whether a tick, also one that raised, has changed a status."""
         if self._visited != self._visited_before:
             self._kinds = {type(node) for node in self._visited}
-            self._asking = [node.asks for node in self._visited if hasattr(node, "asks")]
+            self._asking = [node for node in self._visited if hasattr(node, "asks")]
             self._visited_before = self._visited
         self.stopped()
         return self._changed
@@ -150,7 +153,7 @@ class ChangeVisitor(VisitorBase):
     @property
     def watching(self) -> bool:
         """Whether a ticked node may watch a source without events: the clock, or a variable."""
-        if any(asks() for asks in self._asking):
+        if True in map(_ASKS, self._asking):
             return True
         ours = ActionBehaviour.tick, ActionBehaviour.update
         return any(

@@ -204,7 +204,18 @@ def test_only_if_is_asked_when_a_visit_begins_and_not_again(leaf: Leaf, log: lis
     gate(node, {}, only_if=lambda: asked.append("?") or "")  # type: ignore[func-returns-value]
     assert ticked(node, log, 4) == ["a+ R", "R", "aS S", "a+ R"]
     assert asked == ["?", "?"]
-    assert not node.asks()  # type: ignore[attr-defined]
+    assert not node.asks  # type: ignore[attr-defined]
+
+
+def test_a_node_that_was_left_out_asks_again_until_it_begins(
+    out: Leaf, log: list[str], there: list[bool]
+) -> None:
+    node = out("a", "R")
+    assert ticked(node, log) == ["S"]
+    assert node.asks  # type: ignore[attr-defined]
+    there[0] = True
+    assert ticked(node, log) == ["a+ R"]
+    assert not node.asks  # type: ignore[attr-defined]
 
 
 def test_only_while_is_asked_before_each_tick_and_stops_what_runs(
@@ -217,7 +228,7 @@ def test_only_while_is_asked_before_each_tick_and_stops_what_runs(
     assert ticked(root, log, 2) == ["a+ R", "R"]
     why[0] = "$x is false"
     assert ticked(root, log) == ["ax b+ bS S"]
-    assert node.asks()  # type: ignore[attr-defined]
+    assert node.asks  # type: ignore[attr-defined]
 
 
 def test_a_gate_that_cannot_be_asked_fails_the_node_and_says_why(

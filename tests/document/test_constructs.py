@@ -261,6 +261,28 @@ def test_a_subtree_hands_changed_inputs_on_while_it_runs(
         assert sent(runner) == wanted
 
 
+def test_a_node_that_is_left_out_at_its_begin_waits_for_no_goal_of_an_earlier_visit(
+    load: Load, network: VirtualNetwork
+) -> None:
+    root = load(
+        HEAD.replace("tree: t", "tree: t\ninputs: {go: {type: bool, default: true}}")
+        + """
+  repeat: R
+  times: 2
+  child:
+    parallel: P
+    policy: one
+    children:
+      - {move: A, goal: {distance: 5.0}, only_if: $go}
+      - {sequence: S, children: [{wait: 500 ms}, {set: {go: false}}]}
+"""
+    )
+    runner = VirtualRunner(root, network)
+    assert runner.run() is Status.SUCCESS
+    told = [event.state for event in runner.events if isinstance(event, GoalChanged)]
+    assert told[-3:] == ["EXECUTING", "CANCELING", "DONE"], "and no goal follows"
+
+
 def test_what_a_failure_tells_is_zero_before_and_kept_where_nothing_came(
     load: Load, network: VirtualNetwork
 ) -> None:
@@ -342,7 +364,7 @@ def test_what_feedback_tells_is_kept_while_a_goal_runs_and_when_it_has_failed(lo
       policy: one
       children:
         - {lift: Up, save_feedback: {at: feedback.current_pose}}
-        - {sequence: T, children: [{wait_until: $at > 3.0}, {set: {near: $at}}]}
+        - {sequence: T, children: [{wait_until: $at > 3.0}, {set: {seen: $at}}]}
     - {lift: Up, until: feedback.current_pose < $at, save_feedback: {at: feedback.current_pose}}
 """
     )
@@ -351,7 +373,7 @@ def test_what_feedback_tells_is_kept_while_a_goal_runs_and_when_it_has_failed(lo
     told = tree_outputs(root)
     assert (told["before"], told["lacked"]) == (False, True)
     assert 0.0 < told["failed"] < 4.0
-    assert 3.0 < told["near"] < 3.5
+    assert 3.0 < told["seen"] < 3.5
     assert told["at"] < 1.0, "until is asked first"
 
 
