@@ -11,13 +11,16 @@ from bt_actions.events import Event
 from bt_actions.page import server
 from tests.page.conftest import SHOWN, Begin, Served
 from tests.page.test_feed import told_of
+from tests.page.test_front import named
 from tests.support import browser as chromium
 from tests.support.recordings import Going
 from tests.support.waiting import until
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing() or "-")
+CONNECTIONS = 6
+"""What a browser has to a server."""
 MANY = 8
-"""Tabs: a browser has six connections to a server."""
+"""Tabs."""
 HIDE = (
     "Object.defineProperty(document, 'hidden', { value: true });"
     "document.dispatchEvent(new Event('visibilitychange'));"
@@ -178,3 +181,26 @@ def test_the_front_has_one_stream_in_all_tabs(tab: Tab, streams: list[object]) -
     until(lambda: len(streams) == 1)
     for one in tabs:
         assert one.run("return document.querySelectorAll('.card').length") == 1
+
+
+def test_more_tabs_of_different_runs_than_a_browser_has_connections_say_so_and_then_go_on(
+    tab: Tab, streams: list[object], begin: Begin, events: list[Event]
+) -> None:
+    ids = []
+    for number in range(1, CONNECTIONS + 2):
+        mine = named(events, number, f"tree{number}")
+        begin(mine).write(mine[:10])
+        ids.append(f"{number:02x}" * 16)
+    shown = [tab(place=f"&run={each}") for each in ids[: CONNECTIONS - 1]]
+    crowded = [
+        tab("document.getElementById('other').innerText.includes('Five windows')", place)
+        for place in ("&runs", f"&run={ids[-2]}", f"&run={ids[-1]}")
+    ]
+    assert len(streams) == len(shown)
+    for one in shown[:2]:
+        one.page.close()
+    for one in crowded[1:]:
+        assert one.wait_for(SHOWN)
+    shown[2].run(HIDE)
+    assert crowded[0].wait_for("document.querySelectorAll('.card').length > 5")
+    assert len(streams) == CONNECTIONS - 1

@@ -5,7 +5,7 @@ import { el } from "./dom.js";
 import { status_glyph } from "./glyphs.js";
 import { look_of } from "./head.js";
 import { Stream } from "./stream.js";
-import { clock } from "./words.js";
+import { clock, CROWDED } from "./words.js";
 
 const text = (node, value) => {
   if (node.textContent !== value) node.textContent = value;
@@ -70,7 +70,11 @@ export class Front {
       text(this.lost, `The server is not to be had since ${this.since}: what is shown is how the runs stood then.`);
       this.grid.classList.add("old");
     };
-    this.stream = new Stream("/now", { hear: (_, data) => this.show(JSON.parse(data).runs), lose });
+    const crowd = () => {
+      text(this.lost, CROWDED.join(". "));
+      this.grid.classList.add("old");
+    };
+    this.stream = new Stream("/now", { hear: (_, data) => this.show(JSON.parse(data).runs), lose, crowd });
   }
   close() {
     this.stream.close();

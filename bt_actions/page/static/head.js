@@ -2,7 +2,7 @@
 
 import { el } from "./dom.js";
 import { status_glyph } from "./glyphs.js";
-import { clock, span, STATE } from "./words.js";
+import { clock, span, CROWDED, STATE } from "./words.js";
 
 const find = (id) => document.getElementById(id);
 const text = (node, value) => {
@@ -181,11 +181,13 @@ export function create_head(app) {
             ? `The recording ends at ${clock(run.clock)}, ${when(run.info.wall + run.clock)}: its process was killed, and what ran then may still run.${hurt}`
             : hurt && !["stale", "lost"].includes(now)
               ? `The recording:${hurt}`
-              : now === "lost"
-                ? `${last}; ${next ? `next try in ${next} s` : "trying"}. What is missed is filled in.`
-                : link.tick > 2
-                  ? `${last}: the tick of the tree lasts for ${Math.floor(link.tick + ago)} s.`
-                  : `${last}: nothing has come since, not even a heartbeat.`;
+              : link.stream?.is_crowded
+                ? `${last}. ${CROWDED.join(". ")}`
+                : now === "lost"
+                  ? `${last}; ${next ? `next try in ${next} s` : "trying"}. What is missed is filled in.`
+                  : link.tick > 2
+                    ? `${last}: the tick of the tree lasts for ${Math.floor(link.tick + ago)} s.`
+                    : `${last}: nothing has come since, not even a heartbeat.`;
     text(box.firstChild, words);
     box.title = words;
   }

@@ -42,6 +42,11 @@ export class Link {
       from: () => `?after=${encodeURIComponent(`${run.key}:${run.number}`)}`,
       hear: (kind, data) => this[kind](JSON.parse(data)),
       lose: () => this.lose(),
+      crowd: () => {
+        this.is_open = false;
+        this.look();
+        this.told("lost");
+      },
     });
   }
 

@@ -20,6 +20,7 @@ import { Front } from "./front.js";
 import { toast, dress, splitters } from "./dress.js";
 import { listen } from "./keys.js";
 import { ways } from "./ways.js";
+import { CROWDED } from "./words.js";
 
 const wide = matchMedia("(min-width: 1680px)"),
   narrow = matchMedia("(max-width: 700px), (max-height: 560px)"); // as in style.css
@@ -144,7 +145,8 @@ function told(run, what) {
     return app.open(run.key, params_now());
   if (!app.settled && run.began && (what === "settled" || run.over)) settle();
   else if (!app.settled && run.over) none(app.link.why || "This recording holds no run");
-  else if (!app.settled && what === "lost") none("This run is not to be had");
+  else if (!app.settled && what === "lost")
+    none(...(app.link.stream.is_crowded ? CROWDED : ["This run is not to be had"]));
 }
 
 function settle() {

@@ -7,26 +7,42 @@
 // on from where it is. A tab that hears nothing for long, as where the leader stands still, opens its own stream, too.
 //
 // A tab that nobody sees takes no part: link.js and front.js close its stream. Tabs that show different runs have a
-// stream each. Where a browser has no Web Locks, each tab has its own.
+// stream each, MOST at a time: one connection is left for all else, without which the next page would never load. A tab
+// that would have one more says so, and asks again. Where a browser has no Web Locks, each tab has its own stream.
 
 const KINDS = ["events", "beat", "end", "reset", "broken", "now"];
 const SILENT = 3000; // milliseconds; the server has something to tell each second
+const MOST = 5;
+const AGAIN = 1000; // milliseconds
 
 export class Stream {
   // `number()` is that of the last event that this tab has, `from()` is how the address says it; `hear` takes the kind and
-  // the data of a message, `lose` is called where the server is not to be had.
-  constructor(path, { number = () => 0, from = () => "", hear, lose }) {
-    Object.assign(this, { path, number, from, hear, lose, leads: false, is_closed: false });
-    this.open();
-    if (!navigator.locks) return;
+  // the data of a message, `lose` is called where the server is not to be had, `crowd` where MOST other streams are open.
+  constructor(path, { number = () => 0, from = () => "", hear, lose, crowd }) {
+    Object.assign(this, { path, number, from, hear, lose, crowd, leads: false, is_crowded: false, is_closed: false });
+    if (!navigator.locks) return this.open();
     this.channel = new BroadcastChannel(path);
     this.channel.onmessage = ({ data }) => this.follow(data);
-    const over = new Promise((resolve) => (this.release = resolve));
-    navigator.locks.request(path, () => {
-      this.leads = true;
-      if (!this.is_closed) this.ensure();
-      return over;
+    this.over = new Promise((resolve) => (this.release = resolve));
+    this.ask({ ifAvailable: true });
+  }
+
+  ask(options) {
+    navigator.locks.request(this.path, options, async (lock) => {
+      if (!lock) this.ask({});
+      this.is_crowded = Boolean(lock) && (await navigator.locks.query()).held.length > MOST;
+      if (this.is_closed) return;
+      if (this.is_crowded) return this.wait();
+      this.leads = Boolean(lock);
+      this.ensure();
+      return this.leads && this.over;
     });
+  }
+
+  wait() {
+    this.source?.close();
+    this.again = setTimeout(() => this.ask({ ifAvailable: true }), AGAIN);
+    this.crowd();
   }
 
   open() {
@@ -44,19 +60,20 @@ export class Stream {
   follow({ kind, data, before }) {
     clearTimeout(this.silent);
     if (this.number() < before) return this.ensure();
-    if (kind !== "events") this.source.close();
+    if (kind !== "events") this.source?.close();
     this.silent = setTimeout(() => this.ensure(), SILENT);
     this.hear(kind, data);
   }
 
   ensure() {
-    if (this.source.readyState === EventSource.CLOSED) this.open();
+    if ((this.source?.readyState ?? EventSource.CLOSED) === EventSource.CLOSED) this.open();
   }
 
   close() {
     this.is_closed = true;
     clearTimeout(this.silent);
-    this.source.close();
+    clearTimeout(this.again);
+    this.source?.close();
     this.channel?.close();
     this.release?.();
   }

@@ -81,6 +81,10 @@ export const PHASE_WORD = {
   backoff: "backoff",
   cancel: "canceling",
 };
+export const CROWDED = [
+  "Five windows of this browser show other runs",
+  "A browser has six connections to a server. This window goes on when one of the others is closed or hidden.",
+];
 export const DEADLINE = { queued: "queue", server: "server", sent: "accept", exec: "result", cancel: "cancel" };
 export const kind_word = (node) => (node.kind === "action" ? node.type || node.kind : node.kind);
 export const place = (node) => (node.line ? `${node.file}:${node.line}` : node.file || node.kind);
