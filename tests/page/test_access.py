@@ -3,7 +3,9 @@ a system forces, and without motion."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -11,8 +13,9 @@ from axe_playwright_python.sync_playwright import Axe
 from bt_actions import load_tree, render
 from bt_actions.document.cards import cards_of
 from bt_actions.document.describing import nodes_of
-from tests.page.conftest import ROOT, Page
+from tests.page.conftest import ROOT, Page, Served
 from tests.support import browser as chromium
+from tests.support.waiting import until
 
 pytestmark = [
     pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing() or "-"),
@@ -47,6 +50,14 @@ def test_there_are_no_barriers_in_help_and_in_the_choice_of_runs(over: Page) -> 
         window.wait_for(f"document.querySelector('{opened}')?.checkVisibility()")
         assert barriers(window) == []
         window.keys("Escape")
+
+
+def test_there_are_no_barriers_where_there_is_no_run(
+    window: chromium.Browser, served: Served
+) -> None:
+    window.open(served.address)
+    assert window.wait_for("document.querySelector('#other h1')?.innerText === 'No run yet'")
+    assert barriers(window) == []
 
 
 def test_there_are_no_barriers_in_a_tree_that_is_drawn(
@@ -98,7 +109,7 @@ def test_all_that_can_be_pressed_is_reached_by_tab_and_seen_to_be(over: Page) ->
         assert window.run(f"{ring} || document.activeElement.matches('.split')"), reached[-1]
         if reached[-1] == "lanes":
             break
-    wanted = ["switch", "conn", "query", "details", "split-side", "tab-details", "split-time"]
+    wanted = ["switch", "query", "details", "split-side", "tab-details", "split-time"]
     assert set(wanted) <= set(reached)
     assert [each for each in reached if each.startswith("row-")] != []
     before = window.run("return page.t")
@@ -149,3 +160,33 @@ def test_nothing_moves_by_itself_where_nothing_comes(over: Page) -> None:
     window = over.open("#t=4.0")
     assert window.run("return document.querySelectorAll('.st-running').length") > 2
     assert window.run("return document.getAnimations().length") == 0
+
+
+def heard(window: chromium.Browser, role: str) -> list[str]:
+    """The names of what has a role, in the order in which a screen reader has them."""
+    session = window.page.context.new_cdp_session(window.page)
+    nodes = {each["nodeId"]: each for each in session.send("Accessibility.getFullAXTree")["nodes"]}
+
+    def under(node: dict[str, Any]) -> Iterator[str]:
+        if node.get("role", {}).get("value") == role:
+            yield node["name"]["value"]
+        for child in node.get("childIds", ()):
+            yield from under(nodes[child])
+
+    return list(under(next(iter(nodes.values()))))
+
+
+def test_a_screen_reader_has_the_rows_of_the_outline_in_the_order_of_the_tree(over: Page) -> None:
+    window = over.open()
+    y = "new DOMMatrix(getComputedStyle(one).transform).f"
+    rows = (
+        f"[...document.querySelectorAll('.row:not([hidden])')].map((one) => [{y}, one.ariaLabel])"
+    )
+
+    def agree() -> bool:
+        seen = [label for _, label in sorted(window.run(f"return {rows}"))]
+        return len(seen) > 20 and heard(window, "treeitem") == seen
+
+    for top in (0, 200, 100):
+        window.run("document.getElementById('tree-scroll').scrollTop = arguments[0]", top)
+        until(agree)

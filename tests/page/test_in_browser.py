@@ -33,6 +33,8 @@ def test_a_run_that_failed_says_why_first_with_the_line_of_the_file(over: Page) 
     strip = " ".join(window.run(f"return {WHY}").split())
     assert strip.startswith("Why exit code 1 Home: ABORTED aborted by /move_robot;")
     assert "examples/night/night.yaml :90" in strip
+    said = window.run("return document.getElementById('said').textContent")  # to a screen reader
+    assert said.startswith("Home: ABORTED. At 00:")
     for passed_on in ("Home in time", "Straight home", "Go home", "Shift"):
         assert passed_on in strip
     assert over.text("#status", "Failed") == "Failed"

@@ -34,6 +34,15 @@ TREE = (
 )
 BARS = "[...document.querySelectorAll('.bar')].map((one) => one.getBoundingClientRect().left)"
 
+HEARD = """
+window.heard = [];
+for (const one of document.querySelectorAll("[role=status], [role=alert], [aria-live=polite]")) {
+  new MutationObserver(() => heard.push(one.textContent))
+    .observe(one, { childList: true, characterData: true, subtree: true });
+}
+"""
+"""Notes what changes in the places of which a screen reader tells."""
+
 
 class Story:
     """Events, each at its time in seconds since the run began."""
@@ -215,6 +224,20 @@ def test_nothing_shifts_live_nor_through_loss_of_the_server(
         assert window.run("return window.shifts") == 0
     finally:
         beating.stop()
+
+
+def test_a_screen_reader_is_told_once_that_the_server_is_gone_not_each_second(
+    page: Page, begin: Begin, story: Story, served: Served
+) -> None:
+    begin(story.told).write(story.told)
+    window = page.open()
+    page.text("#conn", "Stale")
+    window.run(HEARD)
+    served.stop()
+    page.text("#banner", "next try in 2 s")
+    page.text("#banner", "next try in 1 s")
+    assert len([each for each in window.run("return heard") if "next try in" in each]) == 1
+    served.start()
 
 
 def test_the_strip_names_leaf_rule_and_time_left_at_any_time(

@@ -157,7 +157,8 @@ export function create_head(app) {
           : link.damaged
             ? "stale"
             : "");
-    if (box.dataset.k !== tone + now) {
+    const is_new = box.dataset.k !== tone + now;
+    if (is_new) {
       box.dataset.k = tone + now;
       box.className = tone;
       box.replaceChildren(
@@ -189,6 +190,7 @@ export function create_head(app) {
                     ? `${last}: the tick of the tree lasts for ${Math.floor(link.tick + ago)} s.`
                     : `${last}: nothing has come since, not even a heartbeat.`;
     text(box.firstChild, words);
+    if (is_new) app.tell(words); // once: the seconds of a countdown are not said
     box.title = words;
   }
   return { update };

@@ -57,8 +57,12 @@ const app = {
   hidden(id) {
     return wide.matches ? false : narrow.matches ? app.pane !== id : app.tab !== id;
   },
-  say(words) {
+  // For a screen reader.
+  tell(words) {
     find("said").textContent = words;
+  },
+  say(words) {
+    app.tell(words);
     toast(words);
   },
   select(n, { reveal = false, attempt } = {}) {
@@ -272,8 +276,10 @@ function show_front() {
   find("other").hidden = false;
   front ??= new Front(app, find("other"));
 }
-function none(words, more) {
+function none(words = "No run yet", more) {
   document.body.dataset.state = "empty";
+  find("tree-name").textContent = "Runs";
+  document.title = find("title").textContent = words;
   find("other").hidden = false;
   show_none(find("other"), words, more);
 }

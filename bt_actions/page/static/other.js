@@ -8,12 +8,12 @@ export function show_none(box, words, more) {
     el(
       "div",
       { class: "in" },
-      el("h1", { text: words || "No run yet" }),
+      el("h1", { text: words }),
       el("p", {
         text:
           more || "This page shows a run as soon as one is recorded on this computer. Nothing has to be loaded again.",
       }),
-      el("h3", { text: "Begin one without robots" }),
+      el("h2", { text: "Begin one without robots" }),
       line("bt-actions run pick_and_place --sim --fault move_robot:2:abort"),
       el(
         "p",

@@ -201,6 +201,7 @@ export function create_strip(app) {
         );
         words = reason;
         button.title = `At ${clock(failure.t)}: ${reason} (${place(node)})`;
+        app.tell(`${node.name}: ${outcome}. ${button.title}`);
       } else {
         const dealt = n === failure.by;
         words = dealt ? "went on" : is_stopped ? "" : because(node);

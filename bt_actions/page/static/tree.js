@@ -71,6 +71,9 @@ export function create_tree(app) {
       }
       paint(app, one, entry, searching.hits);
     });
+    // The rows are in the document in any order; a screen reader has them in that of the tree.
+    const owned = wanted.map((node) => `row-${node.id}`).join(" ");
+    if (owned !== rows.getAttribute("aria-owns")) rows.setAttribute("aria-owns", owned);
     for (const one of free) {
       one.row.hidden = true;
       one.node = null;
