@@ -25,6 +25,7 @@ from tests.support import browser as chromium
 
 pytestmark = pytest.mark.skipif(bool(chromium.missing()), reason=chromium.missing() or "-")
 SERVER = "/arm/move"
+TO = {"to": 1.0}
 LIMITS = {"result": 60.0, "feedback": None, "accept": 5.0}
 TREE = (
     Node(1, None, "Work", "sequence"),
@@ -56,14 +57,14 @@ class Story:
     def add(self, t: float, kind: type[Event], *of: Any) -> None:
         self.told.append(kind(Moment(next(self._numbers), 100.0 + t, 1e9 + t, 0.0), *of))
 
-    def begin(self, t: float, goal: str) -> None:
+    def begin(self, t: float, goal: str, message: Any = TO) -> None:
         """The leaf's goal is sent, and executes."""
         self.add(t, NodeChanged, 2, Status.RUNNING, "")
-        self._goal(t, goal, "SENDING", None, None, {"to": 1.0})
+        self._goal(t, goal, "SENDING", None, None, message)
         self._goal(t + 0.1, goal, "EXECUTING", None, None)
 
-    def end(self, t: float, goal: str) -> None:
-        self._goal(t, goal, "DONE", Outcome.SUCCEEDED, End.SUCCEEDED)
+    def end(self, t: float, goal: str, result: Any = None) -> None:
+        self._goal(t, goal, "DONE", Outcome.SUCCEEDED, End.SUCCEEDED, None, result)
         self.add(t, NodeChanged, 2, Status.SUCCESS, "")
 
     def _goal(self, t: float, goal: str, state: str, outcome: Any, end: Any, *of: Any) -> None:
@@ -224,6 +225,20 @@ def test_nothing_shifts_live_nor_through_loss_of_the_server(
         assert window.run("return window.shifts") == 0
     finally:
         beating.stop()
+
+
+@pytest.mark.parametrize(
+    ("goal", "words"), [("•••", "hidden: it may hold a secret"), (None, "not recorded")]
+)
+def test_the_details_say_why_no_goal_is_there_and_have_room_for_a_long_result(
+    page: Page, begin: Begin, story: Story, goal: object, words: str
+) -> None:
+    story.begin(6.0, "7" * 32, goal)
+    story.end(7.0, "7" * 32, {"message": "x" * 300})
+    begin(story.told).write(story.told)
+    window = page.open("#node=2")
+    assert words in page.text("#details .two", "Goal")
+    assert window.run("return details.scrollWidth - details.clientWidth") == 0
 
 
 def test_a_screen_reader_is_told_once_that_the_server_is_gone_not_each_second(

@@ -49,14 +49,15 @@ export function messages(node, at, t, ticking) {
               ),
             ),
           )
-        : el("p", { class: "none-yet", style: "margin:0", text: none }),
+        : el("p", { class: "none-yet", style: "margin:0", text: values ? "hidden: it may hold a secret" : none }),
     );
   const over = at.done <= t,
+    is_sent = at.phases.some((one) => one.st === "sent" && one.from <= t),
     out = [
       el(
         "div",
         { class: "two" },
-        fields("Goal", at.goal, "not sent", at.g),
+        fields("Goal", at.goal, is_sent ? "not recorded" : "not sent", at.g),
         fields("Result", over ? at.result : null, over ? "none came, or none is recorded" : "not there yet"),
       ),
     ];

@@ -90,7 +90,9 @@ export function create_tree(app) {
   function crumbs(n) {
     const path = [];
     for (let up = app.run.nodes[n]; up; up = app.run.nodes[up.parent]) path.unshift(up.name);
-    const told = path.join("  ›  ") || `${app.run.order.length.toLocaleString("en")} nodes`;
+    const told =
+      path.join("  ›  ") ||
+      (app.run.order.length === 1 ? "1 node" : `${app.run.order.length.toLocaleString("en")} nodes`);
     if (find("crumbs").textContent !== told) find("crumbs").textContent = told;
   }
   function label(button, look, word, count) {
