@@ -180,6 +180,7 @@ def test_what_happens_appears_and_the_page_follows(page: Page, begin: Begin) -> 
         beating.stop()
     run.end()
     assert page.text("#conn", "Replay") == "Replay"
+    assert window.wait_for("page.t === page.run.clock")  # as when it is opened again
     assert "interrupted by SIGINT" in page.text("#why", "Stopped")
 
 

@@ -57,9 +57,8 @@ const app = {
   hidden(id) {
     return wide.matches ? false : narrow.matches ? app.pane !== id : app.tab !== id;
   },
-  // For a screen reader.
   tell(words) {
-    find("said").textContent = words;
+    find("said").textContent = words; // by a screen reader
   },
   say(words) {
     app.tell(words);
@@ -195,8 +194,9 @@ function frame(now) {
   if (!link) return;
   link.look();
   if (!app.settled) return;
-  if (link.head > app.head) {
-    app.head = link.head;
+  const head = link.ended ? link.head : Math.max(app.head, link.head);
+  if (head !== app.head) {
+    app.head = head;
     dirty = true;
   }
   if (app.at_head) app.t = app.head;
