@@ -22,26 +22,25 @@ HEAD = """\
 
 <!-- Written by `make chaos` from its last run; do not edit. -->
 
-**What was tried.** Goals on the real middleware while servers are killed, stopped, restarted,
-late or there twice, answers are lost or doubled, trees change their mind, programs end, networks
-are cut. The processes, signals and network cuts are real; a row names what only takes the place
-of something.
+**What was tried.** Each scenario sends goals over the real middleware. Meanwhile servers die, stop,
+restart, come late or run twice, answers are lost or doubled, trees change their mind, programs end,
+and networks are cut. The processes, signals and network cuts are real; a row says so where a scenario
+only imitates a fault.
 """
 READING = """\
-**How to read a row.** A server writes a journal: a line as each goal is received, accepted,
-canceled and finished. A scenario is judged by that journal ("–": no server took part); the
-client's own view is not believed. It stands beside the journal as the outcome, with the end of a
-goal where that is another. The time is the one from what was done to the outcome, where it was
-measured, rounded.
+**How to read a row.** Each server writes a journal, with a line for each goal that it receives,
+accepts, cancels or finishes. The journal decides whether the scenario held ("–": no server took
+part). The outcome is the client's own view, with the end of the goal where the two differ. The time
+is the rounded time from the fault to the outcome, where the scenario measured it.
 
-What no client can keep: [promises.md](promises.md#what-cannot-be-known-from-outside). The short
-lease for servers of your own: [reliability-settings.md](reliability-settings.md). All talk over
-UDP (on loopback, or on the link between two network namespaces) but the servers "with Fast DDS as
-it comes".
+[promises.md](promises.md#what-cannot-be-known-from-outside) has the promises that no client can keep,
+and [reliability-settings.md](reliability-settings.md) the short lease for servers of your own. All
+processes use UDP (on loopback, or on the link between two network namespaces), except the servers
+"with Fast DDS as it comes".
 
-One row again: `python -m pytest tests/scenarios -m "" -k killed_with_the_short_lease`, the words
-of its name. By hand: `bt-actions sim --fault move_robot:1:die` in one terminal, `bt-actions run`
-in another.
+To repeat a row, use the words of its name: `python -m pytest tests/scenarios -m "" -k
+killed_with_the_short_lease`. By hand: `bt-actions sim --fault move_robot:1:die` in one terminal,
+`bt-actions run` in another.
 """
 ON_A_BUSY_MACHINE = 3.0
 """Times longer than a scenario's limit is good enough where no report is written: `make test` runs
