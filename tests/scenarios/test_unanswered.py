@@ -94,7 +94,7 @@ def test_cleanup_that_is_stopped_leaves_the_record_to_the_next(
     journal = serve(f"1:delay_accept={DELAY:g}")
     received(launch, journal, tree(name, distance=90.0), signal.SIGKILL)
     first = launch("cleanup")
-    until(lambda: "was not answered" in "\n".join(first.errors), 20.0, what="it waits")
+    until(lambda: "without an answer" in "\n".join(first.errors), 20.0, what="it waits")
     first.send(signal.SIGINT)
     assert first.wait() == 3, first
     second = launch("cleanup")

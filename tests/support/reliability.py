@@ -24,8 +24,8 @@ HEAD = """\
 
 **What was tried.** Each scenario sends goals over the real middleware. Meanwhile servers die, stop,
 restart, come late or run twice, answers are lost or doubled, trees change their mind, programs end,
-and networks are cut. The processes, signals and network cuts are real; a row says so where a scenario
-only imitates a fault.
+and networks are cut. The processes, signals and network cuts are real; a row says so where a
+scenario only imitates a fault.
 """
 READING = """\
 **How to read a row.** Each server writes a journal, with a line for each goal that it receives,
@@ -33,10 +33,10 @@ accepts, cancels or finishes. The journal decides whether the scenario held ("â€
 part). The outcome is the client's own view, with the end of the goal where the two differ. The time
 is the rounded time from the fault to the outcome, where the scenario measured it.
 
-[promises.md](promises.md#what-cannot-be-known-from-outside) has the promises that no client can keep,
-and [reliability-settings.md](reliability-settings.md) the short lease for servers of your own. All
-processes use UDP (on loopback, or on the link between two network namespaces), except the servers
-"with Fast DDS as it comes".
+[promises.md](promises.md#what-cannot-be-known-from-outside) has the promises that no client can
+keep, and [reliability-settings.md](reliability-settings.md) the short lease for servers of your
+own. All processes use UDP (on loopback, or on the link between two network namespaces), except the
+servers "with Fast DDS as it comes".
 
 To repeat a row, use the words of its name: `python -m pytest tests/scenarios -m "" -k
 killed_with_the_short_lease`. By hand: `bt-actions sim --fault move_robot:1:die` in one terminal,
