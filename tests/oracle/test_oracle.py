@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bt_actions.importing.kinds import KINDS
-from tests.support.oracle.cases import CASES, Case, read
+from tests.support.oracle.cases import CASES, LATER, Case, read
 from tests.support.oracle.comparing import difference, listed
 from tests.support.oracle.importing import NotYet
 
@@ -23,6 +23,8 @@ def surprises(cases: list[Case], folder: Path) -> tuple[int, list[str]]:
     """How many cases were played, and where one differs that is not listed, or agrees that is."""
     known, found, played = listed(), [], 0
     for case in cases:
+        if LATER in case.kinds:
+            continue
         try:
             told = difference(case, folder)
         except NotYet:

@@ -23,6 +23,12 @@ from pathlib import Path
 from typing import Any
 
 CASES = Path(__file__).parents[2] / "oracle" / "cases.jsonl.gz"
+LATER = "RoundRobinMain"
+"""RoundRobin of Nav2's main, in which a success of the last child is a failure.
+
+The importer writes it as RoundRobin of Jazzy, and says so in its report; what its cases do is
+counted apart.
+"""
 TOLD = "+SFx"
 """What of an action is compared."""
 
