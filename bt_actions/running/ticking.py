@@ -102,7 +102,7 @@ class ChangeVisitor(VisitorBase):
         """
         after_each, visited, none = self._after_each, self._visited, Status.INVALID
         live, running, teller = self._live, Status.RUNNING, self._teller
-        known, heard = self._known, teller.is_heard
+        known, heard, tell, settle = self._known, teller.is_heard, teller.changed, teller.goes_on
         for behaviour in ticked:
             for visitor in others:
                 behaviour.visit(visitor)
@@ -118,14 +118,14 @@ class ChangeVisitor(VisitorBase):
                 if known.get(behaviour) is not status:
                     known[behaviour], self._changed = status, True
                 if heard:
-                    teller.changed(behaviour)
+                    tell(behaviour)
             elif behaviour not in live:
                 live[behaviour] = None
                 known[behaviour], self._changed = status, True
                 if heard:
-                    teller.changed(behaviour)
+                    tell(behaviour)
             elif heard:
-                teller.goes_on(behaviour)
+                settle(behaviour)
             if wrong := after_each():
                 raise Misbehaviour(behaviour, wrong)
 
