@@ -27,7 +27,7 @@ def started(root: Behaviour, **settings: Any) -> Iterator[TreeRunner]:
 
 def unheard() -> ChangeVisitor:
     """A visitor of ticks whose changes nobody hears."""
-    nobody = SimpleNamespace(is_heard=False, changed=lambda node: None)
+    nobody = SimpleNamespace(is_heard=False, changed=lambda node: None, goes_on=lambda node: None)
     return ChangeVisitor(lambda: None, lambda: "", cast(TreeTeller, nobody))
 
 
