@@ -46,7 +46,7 @@ class Asking:
     denied_since: float = math.inf
     """The moment since which every answer was: unknown goal."""
     in_vain: bool = False
-    """Whether the end of the tree waited in vain; nobody waits again until the server is back."""
+    """Whether the wait at the tree's end has failed; no other wait until the server is back."""
     _denied_at: float = 0.0
 
     def ask(self, now: float) -> float:

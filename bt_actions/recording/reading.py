@@ -124,7 +124,7 @@ class Recording:
 
     @property
     def damage(self) -> str:
-        """What is damaged, in words; "" for nothing."""
+        """The damage in words; "" for none."""
         parts = "1 part" if self.damaged == 1 else f"{self.damaged} parts"
         verb = "is" if self.damaged == 1 else "are"
         told = f"{parts} of the recording ({self.damaged_bytes} bytes) {verb} damaged"

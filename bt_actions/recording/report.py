@@ -1,6 +1,6 @@
 """One text of a recorded run: its description, the cause of its failure, its actions, its events.
 
-The runs below its failed leaves (RunTree) are told behind it, as far as this machine has recorded
+The runs below its failed leaves (RunTree) follow, as far as this machine has recorded
 them.
 """
 

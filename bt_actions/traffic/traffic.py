@@ -34,7 +34,7 @@ class Traffic:
     def __init__(self, host: Host, participant: Participant) -> None:
         self.host, self.participant = host, participant
         self.closed = False
-        """Whether it was destroyed; the next tree needs another one."""
+        """Whether the node was destroyed; the next tree needs another node."""
         self._domain = host.domain(participant.domain)
         self._endpoints: dict[str, Endpoint] = {}
 

@@ -294,7 +294,7 @@ class Checker:
         own, *others = (table_of(values.get(key)) for key in SAVES)
         for key, other in zip(SAVES[1:], others, strict=True):
             for name in own.keys() & other.keys() if other else ():
-                text = f"{name!r} is saved of a success, too: nobody could tell which it is of"
+                text = f"{name!r} is also saved after a success: its value would not tell which"
                 self.source.report("BT216", span_of(written[key]), text)
 
     def assigns(self, name: str, kind: FieldType | None, node: Node) -> None:

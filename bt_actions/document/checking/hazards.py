@@ -150,7 +150,7 @@ class Hazards:
         for begun in begun_anew:
             self._report(
                 "BT306", span_of(begun.key),
-                f"this starts again while a later child of {node.name!r} runs, and interrupts it",
+                f"this begins again while a later child of {node.name!r} runs, and stops it",
                 related=Related(node.place, "because of 'memory: false' here"),
             )  # fmt: skip
 

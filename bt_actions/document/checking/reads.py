@@ -153,7 +153,7 @@ class _Order:
     def _report(self, name: str, span: Span, message: str) -> None:
         hint = None
         if name in self._passed:
-            hint = "what writes it does so when it succeeds, and has not when this is reached"
+            hint = "its writer writes on success, and has not succeeded when this node begins"
         self._checker.source.report("BT302", span, message, hint=hint)
 
 

@@ -106,7 +106,7 @@ _INSTEAD: dict[str, tuple[str, str]] = {
     )
     for word in words.split()
 }  # fmt: skip
-"""What to do in place of a foreign key that has no equal here, where another key could stand
+"""The remedy for a foreign key that has no equal here, where another key could stand
 beside it.
 """
 _TYPES = _table(

@@ -125,7 +125,7 @@ MESSAGE_TYPE = Key("type", TypeName("msg"), "The message's type.", required=True
                    example="std_msgs/msg/Bool")  # fmt: skip
 _VALUE_TYPE = Key("type", TypeName("value"), "The value's type.", required=True, example="float64")
 ALIAS = Record(
-    "an action: its type, server and settings",
+    "a mapping with type, server and settings",
     keyed(ACTION_TYPE, ACTION_NAME, *DOING),
 )
 INPUT = Record(
@@ -161,7 +161,7 @@ OUTPUT = Record(
 QOS = Choice(("default", "sensor", "latched", "best_effort", "services"))
 TOPIC_NAME = RosName("the name of a topic")
 TOPIC = Record(
-    "a topic: its name and type",
+    "a mapping with topic and type",
     keyed(
         Key("topic", TOPIC_NAME, "The topic's name.", required=True, example="door"),
         MESSAGE_TYPE,
@@ -173,7 +173,7 @@ TOPIC = Record(
     ),
 )  # fmt: skip
 OWN_KIND = Record(
-    "a kind: its class",
+    "a class, or a mapping with python",
     keyed(
         Key("python", Text("a class, such as package.module.Class, as a text"),
             "A behaviour of py_trees, made with its name and its children.", required=True,

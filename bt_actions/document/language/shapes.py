@@ -245,7 +245,7 @@ def report_unknown_key(
     near = f"; here it is '{here}'" if here else ""
     if not near and not instead:
         near = did_you_mean(key.text, known)
-    there = f"there is {', '.join(known)}" if known else "no other key can stand here"
+    there = f"the keys here are {', '.join(known)}" if known else "no other key can stand here"
     hint = instead or (None if near else there)
     source.report("BT107", span_of(key), f"unknown key {key.text!r}{near}", hint=hint)
 

@@ -167,7 +167,7 @@ class _Reader:
             place = Place(self._source.name, first.line, first.column)
             self._source.report(
                 "BT112", span_of(second),
-                f"a node is one thing: this is {_a_kind(first.text)} and {_a_kind(second.text)}",
+                f"a node has one kind: this is {_a_kind(first.text)} and {_a_kind(second.text)}",
                 hint=self._nested(written, first, second) or "begin a new item with '-'",
                 related=Related(place, "the first is here"),
             )  # fmt: skip
