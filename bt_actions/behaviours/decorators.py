@@ -78,8 +78,8 @@ class Deadline(Gate):
     """A decorator that stops its child after some seconds, and fails when the goals have ended.
 
     py_trees' Timeout fails at once, so that the next behaviour runs beside a goal that is still
-    being canceled. A goal that does not end within its own deadlines is waited for no longer, as a
-    leaf waits for it no longer; its resources stay taken.
+    being canceled. This node waits for a stopped goal as long as its leaf does, until the goal's
+    own deadlines have passed; the resources of a goal without an end stay taken.
 
     Args:
         name: as in py_trees.

@@ -184,10 +184,10 @@ class WaitForMessage(Connected[Subscription], Limited):
 class Publish(Connected[Publisher], Limited):
     """A leaf that publishes one message and succeeds, or fails when the message cannot be built.
 
-    Before it publishes it waits for listeners: for `subscribers` where given; without that only
-    while the node is so new (3.5 seconds) that it may not have discovered them, and only for one.
-    Where nobody listens all the same it publishes and succeeds, and `warning` says so. `shutdown`
-    returns when all listeners have the last message, or a second after it was published.
+    The leaf first waits for `subscribers` subscribers, where that number is given. Otherwise the
+    leaf waits for one subscriber, but only in the first 3.5 seconds of the node, as discovery takes
+    time. Without a subscriber the leaf publishes and succeeds, and `warning` says so. `shutdown`
+    returns when all subscribers have the last message, or a second after it was published.
 
     Args:
         name: as in py_trees.

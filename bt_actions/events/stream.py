@@ -1,7 +1,7 @@
 """The events of one runner in one order, and their readers.
 
 An event gets its moment and its place in the order together, under the stream's lock, on the thread
-on which it happens: the receiving thread for a word of a server, the ticking thread for a node
+on which it happens: the receiving thread for a server's message, the ticking thread for a node
 whose tick returns. That thread notes the event's fields, and no more: the first reader that takes
 makes the events of the notes, for all readers. Each reader has a queue of its own, so no reader
 waits for another, and no producer waits for any. Without a reader, nothing is noted.

@@ -1,10 +1,11 @@
 """Scripts of BehaviorTree.CPP as expressions of ours.
 
-Its scripts know numbers and texts: `true` is 1.0, and `!`, `&&` and `?` take numbers. Ours tell
-true and false from numbers. So each part of a script has a sort, and a part of another sort than
-the needed one is converted: `$n != 0`, `1 if $on else 0`, `float($text)`.
+Scripts there know numbers and texts: `true` is 1.0, and `!`, `&&` and `?` take numbers. Expressions
+here tell true and false from numbers. So each part of a script has a sort, and the importer
+converts a part of another sort than the needed one: `$n != 0`, `1 if $on else 0`, `float($text)`.
 
-The grammar is that of its 4.10, with one surprise: `&&` and `||` bind equally, from the left.
+The grammar is that of BehaviorTree.CPP 4.10, with one surprise: `&&` and `||` bind equally, from
+the left.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The reading of a recorded run: its events in order, and the state behind missing files.
 
-The file may be a stranger's. A damaged record, an event that is none and a number that goes back
-are passed over and counted; names and values without end are an error.
+The file may be a stranger's. The reader passes over a damaged record, an unreadable event and a
+number that goes back, and counts them; names and values without end are an error.
 """
 
 from __future__ import annotations

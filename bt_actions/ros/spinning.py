@@ -47,7 +47,7 @@ os.register_at_fork(after_in_child=_users_lock._at_fork_reinit)  # type: ignore[
 
 
 class Spinner:
-    """The owner of what the caller did not bring (context, node, executor), which spins the node.
+    """The owner of the parts that the caller does not give: context, node, executor.
 
     - No node: a context and a node of its own.
     - An executor that holds no node yet, or none: spun here, on a thread of its own.

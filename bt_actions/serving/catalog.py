@@ -1,8 +1,9 @@
 """The catalog of trees by name: looked up in named folders, never opened by a path. No ROS.
 
-A changed file is read again at the next question. A file that no longer checks keeps its last good
-version. A file that cannot be read soon keeps it, too, and is not waited for again before it has
-been read. All files of a tree must lie in the named folders, or be linked there.
+The catalog reads a changed file again at the next question. A tree whose changed file has errors
+keeps its last good version. So does a tree whose file takes long to read, and the catalog does not
+wait for that file again before the first read is done. All files of a tree must lie in the named
+folders, or be linked there.
 """
 
 from __future__ import annotations

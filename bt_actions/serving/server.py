@@ -59,8 +59,8 @@ class TreeServer:
     """A server of `run_tree`, with services by which others list, check and control trees.
 
     Args:
-        node: the place of all of it, from which the trees' goals are sent. Another thread than the
-            one that makes or closes the server spins it; any executor will do.
+        node: the node of the action, and of the goals of the trees. Spin it, in any executor, on
+            another thread than the one that makes or closes the server.
         trees: folders of trees, or ``package://NAME/trees``; a tree's name is its file's. Other
             files are read only where they are linked there.
         policy: what to do with a goal while another runs: "reject", "queue", "replace", "parallel".

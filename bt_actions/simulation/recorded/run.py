@@ -1,7 +1,7 @@
-"""The deeds of action servers with the goals of a recorded run, folded from its events. No ROS.
+"""The answers of action servers to the goals of a recorded run, folded from its events. No ROS.
 
-The events tell what the client of a server saw, and no more is known: nobody saw how a canceled
-goal would have gone on.
+The events have only the client's view of a server. So no event tells how a canceled goal would have
+gone on.
 """
 
 from __future__ import annotations
