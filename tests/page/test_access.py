@@ -190,3 +190,12 @@ def test_a_screen_reader_has_the_rows_of_the_outline_in_the_order_of_the_tree(ov
     for top in (0, 200, 100):
         window.run("document.getElementById('tree-scroll').scrollTop = arguments[0]", top)
         until(agree)
+
+
+def test_a_screen_reader_has_a_word_for_what_a_shape_tells(over: Page) -> None:
+    window = over.open()
+    assert "/move_robot: in sight" in heard(window, "image")
+    assert "Home: ABORTED at 00:05." in " ".join(heard(window, "button"))
+    window.run("document.getElementById('switch').click()")
+    assert window.wait_for("document.querySelector('#runs .opt')?.checkVisibility()")
+    assert " Failed · " in heard(window, "option")[0]

@@ -3,7 +3,7 @@
 
 import { el } from "./dom.js";
 import { status_glyph } from "./glyphs.js";
-import { look_of } from "./head.js";
+import { look_of, word_of } from "./head.js";
 import { Stream } from "./stream.js";
 import { clock, CROWDED } from "./words.js";
 
@@ -12,8 +12,6 @@ const text = (node, value) => {
 };
 const when = (wall) => new Date(wall * 1000).toLocaleString();
 const place = ({ where }) => [where.simulation && "simulated", where.host, where.node].filter(Boolean).join("  ·  ");
-const WORD = { running: "Goes on", success: "Succeeded", failure: "Failed", stopped: "Stopped" };
-const word_of = (one) => (!one.status && !one.written ? "Never finished" : WORD[look_of(one)]);
 const GLYPH = { lost: "stopped" };
 
 export class Front {

@@ -10,6 +10,8 @@ const text = (node, value) => {
 };
 const LOOK = { SUCCESS: "success", FAILURE: "failure", INVALID: "stopped" };
 export const look_of = (one) => (one.written && !one.status ? "running" : LOOK[one.status] || "stopped");
+const WORD = { running: "Goes on", success: "Succeeded", failure: "Failed", stopped: "Stopped" };
+export const word_of = (one) => (!one.status && !one.written ? "Never finished" : WORD[look_of(one)]);
 const when = (wall) => new Date(wall * 1000).toLocaleString();
 
 export function create_head(app) {
@@ -40,7 +42,7 @@ export function create_head(app) {
           el("b", { text: one.tree }),
           el("span", { class: "num soft", text: one.seconds === null ? "" : clock(one.seconds) }),
           el("span", {
-            text: `${when(one.began)}  ·  ${one.run_id.slice(0, 8)}${one.cause ? `  ·  ${one.cause}` : ""}`,
+            text: [word_of(one), when(one.began), one.run_id.slice(0, 8), one.cause].filter(Boolean).join("  ·  "),
           }),
         );
         return option;

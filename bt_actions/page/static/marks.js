@@ -79,7 +79,7 @@ export class Marks {
 
   flag(a, x) {
     const { app } = this,
-      when = clock(a.decided);
+      told = `${app.run.nodes[a.n].name}: ${a.oc} at ${clock(a.decided)}`;
     const press = (event) => {
       event.stopPropagation();
       app.seek(a.decided);
@@ -92,8 +92,8 @@ export class Marks {
           class: "flag",
           tabindex: "-1",
           style: `left:${px(x)}`,
-          title: `${when} ${app.run.nodes[a.n].name}: ${a.oc}`,
-          "aria-label": `${a.oc} at ${when}`,
+          title: told,
+          "aria-label": told,
           onclick: press,
         },
         status_glyph(a.backoff ? "backoff" : "failure"),
@@ -109,7 +109,9 @@ export class Marks {
     if (lane.up !== look) {
       lane.up = look;
       lane.label.firstChild.replaceWith(status_glyph(look));
-      lane.label.title = up ? `${name}: in sight` : `${name}: not in sight`;
+      lane.label.title = `${name}: ${{ success: "in sight", failure: "not in sight", idle: "not seen yet" }[look]}`;
+      lane.label.setAttribute("role", "img");
+      lane.label.setAttribute("aria-label", lane.label.title);
     }
     const seen = app.run.presence.get(name) || [],
       gaps = [];
