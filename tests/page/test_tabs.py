@@ -199,8 +199,8 @@ def test_more_tabs_of_different_runs_than_a_browser_has_connections_say_so_and_t
     assert len(streams) == len(shown)
     for one in shown[:2]:
         one.page.close()
+    shown[2].run(HIDE)
     for one in crowded[1:]:
         assert one.wait_for(SHOWN)
-    shown[2].run(HIDE)
     assert crowded[0].wait_for("document.querySelectorAll('.card').length > 5")
     assert len(streams) == CONNECTIONS - 1
