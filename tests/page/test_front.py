@@ -146,6 +146,20 @@ def test_without_its_server_the_front_says_since_when_and_goes_on_when_that_is_b
     assert opened.wait_for("document.querySelector('#other p').innerText === ''")
 
 
+def test_a_front_whose_server_had_no_room_for_it_asks_again(
+    opened: chromium.Browser, begin: Begin
+) -> None:
+    begin(RUNS).write(RUNS)
+    assert opened.wait_for(f"{CARDS}.length === 1")
+    opened.page.route("**/now", lambda route: route.fulfill(status=503), times=1)
+    opened.run("location.reload()")
+    assert opened.wait_for(
+        "document.querySelector('#other p')?.innerText.includes('not to be had')"
+    )
+    assert opened.wait_for(f"{CARDS}.length === 1")
+    assert "503" in opened.complaints()[0]
+
+
 def test_a_page_that_nobody_sees_keeps_no_stream_and_misses_nothing(
     opened: chromium.Browser, served: Served, begin: Begin
 ) -> None:

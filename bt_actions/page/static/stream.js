@@ -53,7 +53,10 @@ export class Stream {
         if (this.leads) this.channel.postMessage({ kind, data, before: this.number() });
         this.hear(kind, data);
       });
-    source.onerror = this.lose;
+    source.onerror = () => {
+      this.lose();
+      if (!this.is_closed) this.ensure_soon(); // a browser gives up where the answer is an error
+    };
   }
 
   // What the leader tells. A beat closes this tab's own stream: all that there is has come.
@@ -61,8 +64,13 @@ export class Stream {
     clearTimeout(this.silent);
     if (this.number() < before) return this.ensure();
     if (kind !== "events") this.source?.close();
-    this.silent = setTimeout(() => this.ensure(), SILENT);
+    this.ensure_soon();
     this.hear(kind, data);
+  }
+
+  ensure_soon() {
+    clearTimeout(this.silent);
+    this.silent = setTimeout(() => this.ensure(), SILENT);
   }
 
   ensure() {
