@@ -232,6 +232,9 @@ class Project:
                 kind_of_port = f"{LOOPS[kind].value}[]"
             if port in ("num_cycles", "num_attempts", "msec", "delay_msec"):
                 kind_of_port = "int64"
+            inner = self.trees.get(attributes.get("ID", "")) if kind in SUBTREES else None
+            if inner is not None:
+                name = outer_name(element, inner, port)
             if kind in SUBTREES and name is not None:
                 self._link(port, name)
                 self.sorts.alike(port, name)
@@ -297,6 +300,8 @@ class Project:
         """Return the type of an input or output."""
         sort = self.sorts[name]
         known = self.types.get(name, "")
+        if known.endswith("]"):
+            return known  # the text that is given to a port is a list, written out
         if sort is Sort.TEXT or (sort is not Sort.ANY and not known):
             return str(sort.value)
         return known or "string"
