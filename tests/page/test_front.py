@@ -177,10 +177,12 @@ def test_a_page_that_nobody_sees_keeps_no_stream_and_misses_nothing(
     assert opened.wait_for("document.querySelector('#other p').innerText === ''")
     opened.open(f"{served.address}&run={RUN_ID}")
     assert opened.wait_for("page.shown")
-    opened.run(hide, True)
+    assert opened.run("return document.title").startswith("Running: ")
+    assert opened.run(f"{hide} return document.title", True).startswith("Was running: ")
     assert opened.run("return page.link.stream.source.readyState") == 2
     run.write(events[8:])
     opened.run(hide, False)
+    assert opened.wait_for("document.title.startsWith('Stopped: ')")
     assert opened.wait_for("page.run.events.length === arguments[0]", len(events))
     numbers = opened.run("return page.run.events.map((each) => each.at[0])")
     assert numbers == [each.at.number for each in events]

@@ -106,6 +106,7 @@ export class Link {
     this.close();
     this.is_open = false;
     if (!hidden) this.open();
+    this.look();
   }
 
   // Something of the run was seen: its clock stood at t then.

@@ -144,6 +144,7 @@ window.page = app; // for tests, and for the curious
 function told(run, what) {
   if (run !== app.run) return;
   dirty = true;
+  if (app.settled && document.hidden) panes.head.update(); // no frame comes to a hidden tab, but its title is read
   if (what === "reset" || (app.settled && run.events.length > app.first + app.more))
     return app.open(run.key, params_now());
   if (!app.settled && run.began && (what === "settled" || run.over)) settle();
@@ -246,11 +247,7 @@ async function enter() {
   if (token) {
     params.delete("token");
     history.replaceState(null, "", `#${params}`);
-    try {
-      await fetch("/enter", { method: "POST", body: token });
-    } catch {
-      /* the runs are not to be had, either */
-    }
+    await fetch("/enter", { method: "POST", body: token }).catch(() => null); // nor are the runs to be had
   }
   const runs = await app.fetch_runs(),
     [newest] = runs,
