@@ -133,7 +133,7 @@ def test_what_no_page_could_show_is_refused(
     monkeypatch.setenv("BT_ACTIONS_RECORD", "off")
     assert main(["run", "trees/pick_and_place.yaml", "--sim", "--view"]) == 2
     told = capsys.readouterr().err
-    assert told.count("--view shows runs that are recorded") == 2
+    assert told.count("--view shows a recording in the usual folder") == 2
 
 
 @pytest.mark.parametrize("options", ["--host 127.0.0.1", "--certificate x.pem"])
