@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from bt_actions.document.formatting.format import format_source
 from bt_actions.document.yaml.source import Source
 from bt_actions.importing.kinds import KINDS
 from bt_actions.importing.mapping import Map, nav2
-from bt_actions.importing.names import identifier
+from bt_actions.importing.names import identifier, unique
 from bt_actions.importing.project import SUBTREES, Definition, Project, kind_of
 from bt_actions.importing.reading import XmlError
 from bt_actions.importing.report import Report, Verdict
@@ -37,7 +36,7 @@ def convert(paths: list[Path], mapping: Map | None = None) -> Imported:
     imported.failed = project.failed
     names: dict[str, str] = {}
     for name in project.trees:
-        names[name] = _unique(identifier(name), names.values())
+        names[name] = unique(identifier(name), names.values())
     called = {
         element.attributes.get("ID", "")
         for definition in project.trees.values()
@@ -71,10 +70,3 @@ def convert(paths: list[Path], mapping: Map | None = None) -> Imported:
     if project.stubs:
         imported.files[f"{MODULE}.py"] = module(project.stubs.values())
     return imported
-
-
-def _unique(word: str, taken: Collection[str]) -> str:
-    name, number = word, 2
-    while name in taken:
-        name, number = f"{word}_{number}", number + 1
-    return name

@@ -26,6 +26,9 @@ class Writing(Protocol):
     def node(self, element: Element, scope: Scope) -> Node:
         """Write a node."""
 
+    def variable(self, word: str) -> str:
+        """Return the name of a new variable."""
+
 
 class Given:
     """The attributes of a node: those that were taken are accounted for."""

@@ -44,20 +44,10 @@ def _round_robin(given: Given) -> Node:
 def _parallel(given: Given) -> Node:
     children = given.children()
     number = len(children)
-
-    def counted(*names: str, default: int) -> int:
-        for name in names:
-            if name in given.element.attributes:
-                wanted = given.whole(name)
-                if isinstance(wanted, str):
-                    raise Refused("port", f"{name} is a variable")
-                return wanted if wanted >= 0 else number + wanted + 1
-        return default if default >= 0 else number + default + 1
-
     names = ("success_count", "success_threshold", "threshold")
-    succeeds = counted(*names, default=-1)
+    succeeds = _number_of(given, *names, default=-1)
     skips = all(given.element.attributes.get(name, "-1") == "-1" for name in names)
-    fails = counted("failure_count", "failure_threshold", default=1)
+    fails = _number_of(given, "failure_count", "failure_threshold", default=1)
     policy: dict[str, object] = {}
     if 0 < succeeds < number or (succeeds == number and not skips):  # a child that is left out
         policy["at_least"] = succeeds  # counts for -1 alone
@@ -68,6 +58,36 @@ def _parallel(given: Given) -> Node:
         node["policy"] = policy
     node["children"] = children
     return node
+
+
+def _number_of(given: Given, *names: str, default: int) -> int:
+    """Take a number of children; a negative one counts from all children down."""
+    name = next((each for each in names if each in given.element.attributes), "")
+    wanted = given.whole(name) if name else default
+    if isinstance(wanted, str):
+        raise Refused("port", f"{name} is a variable")
+    return wanted if wanted >= 0 else len(given.element.children) + wanted + 1
+
+
+def _parallel_all(given: Given) -> Node:
+    """Write a parallel whose children count their failures, as each of them runs to its end."""
+    children = given.children()
+    fails = _number_of(given, "max_failures", default=1)
+    if fails > len(children):
+        raise Refused("port", f"max_failures is {fails}, and there are fewer children")
+    given.differs("the node succeeds where all of its children are left out; there it is SKIPPED")
+    failures = given.writer.variable("failures")
+    counted = [
+        Node({"if": child, "then": Node(success="As it is"),
+              "else": Node(set={failures: f"= ${failures} + 1"})})
+        for child in children
+    ]  # fmt: skip
+    steps = [
+        Node(set={failures: 0}),
+        Node(parallel="Each to its end", children=counted),
+        Node(check=f"${failures} < {fails}"),
+    ]
+    return Node(sequence=given.name(), children=steps)
 
 
 def _decorator(kind: str, **more: object) -> Handler:
@@ -286,6 +306,7 @@ KINDS: dict[str, Handler] = {
     "ReactiveFallback": _composite("fallback", "failure", memory=False),
     "RoundRobin": _round_robin,
     "Parallel": _parallel,
+    "ParallelAll": _parallel_all,
     "IfThenElse": _if(),
     "WhileDoElse": _if(memory=False),
     "TryCatch": _try,

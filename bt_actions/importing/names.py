@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from bt_actions.importing.project import Definition
 from bt_actions.importing.scripts import Refused
@@ -28,6 +28,14 @@ def identifier(text: str) -> str:
     """Return the name of ours that is nearest to a text."""
     word = re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")
     return word if re.match("[A-Za-z]", word) else f"x{word}"
+
+
+def unique(word: str, taken: Collection[str]) -> str:
+    """Return a word, with a number where others have the word."""
+    name, number = word, 2
+    while name in taken:
+        name, number = f"{word}_{number}", number + 1
+    return name
 
 
 def input_name(name: str, *, taken: bool) -> str:

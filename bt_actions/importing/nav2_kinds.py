@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bt_actions.importing.given import Given, Handler
 from bt_actions.importing.names import milliseconds, ros_name
-from bt_actions.importing.project import SELECTORS, variable_in
+from bt_actions.importing.project import PLACE, SELECTORS, variable_in
 from bt_actions.importing.report import Verdict
 from bt_actions.importing.scripts import Refused
 from bt_actions.importing.text import Node
@@ -45,6 +45,26 @@ def _pipeline(given: Given) -> Node:
         if each is not inner:
             each.comments, inner.comments = inner.comments, []
     return Node(pipeline=given.name(), children=[*bare, last])
+
+
+def _persistent(given: Given) -> Node:
+    """Write a sequence that keeps the place in its port, until the sequence ends."""
+    name = variable_in(given.text(PLACE), PLACE)
+    if name is None:
+        raise Refused("port", f"{PLACE} names no variable")
+    place = given.scope[name]
+    given.converted(PLACE, "a child that runs is not left where another node writes the port")
+    steps = [
+        Node(sequence=f"Child {number}", only_if=f"${place} == {number}",
+             children=[child, Node(set={place: number + 1})])
+        for number, child in enumerate(given.children())
+    ]  # fmt: skip
+    again = Node(set={place: 0})
+    failed = Node(force_failure="Begin anew", child=again)
+    return Node(
+        fallback=given.name(),
+        children=[Node(sequence="From the place on", children=[*steps, again]), failed],
+    )
 
 
 def _rate(given: Given) -> Node:
@@ -127,6 +147,7 @@ def _goal_updater(given: Given) -> Node:
 NAV2: dict[str, Handler] = {
     "RecoveryNode": _recovery,
     "PipelineSequence": _pipeline,
+    "PersistentSequence": _persistent,
     "RateController": _rate,
     "GoalUpdated": _goal_updated,
     "GlobalUpdatedGoal": _goal_updated,

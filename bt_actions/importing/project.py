@@ -230,7 +230,7 @@ class Project:
                 kind_of_port = "geometry_msgs/msg/PoseStamped"
             if kind in LOOPS and port == "queue":
                 kind_of_port = f"{LOOPS[kind].value}[]"
-            if port in ("num_cycles", "num_attempts", "msec", "delay_msec"):
+            if port in ("num_cycles", "num_attempts", "msec", "delay_msec", PLACE):
                 kind_of_port = "int64"
             inner = self.trees.get(attributes.get("ID", "")) if kind in SUBTREES else None
             if inner is not None:
@@ -375,6 +375,8 @@ class Project:
         leaf = self.mapping.leaves.get(kind)
         if kind in LOOPS:
             return "output" if port == "value" else "input"
+        if kind == "PersistentSequence" and port == PLACE:
+            return "inout"
         if kind in WRITTEN_BY_KIND:
             return "output" if port == WRITTEN_BY_KIND[kind] else "input"
         if leaf is not None and port in leaf.outputs:
@@ -423,6 +425,8 @@ COMPARED = {
     "BlackboardCheckBool": "bool",
 }
 """Decorators of BehaviorTree.CPP 3 that compare two values, and the type of these."""
+PLACE = "current_child_idx"
+"""The port of PersistentSequence that tells the child to go on with."""
 _WITHOUT_PORTS = ("GoalUpdated", "GlobalUpdatedGoal", "GoalUpdatedController")
 """Kinds whose ports have no meaning here."""
 WRITTEN_BY_KIND = {"GoalUpdater": "output_goal", **SELECTORS}

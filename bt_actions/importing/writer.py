@@ -19,6 +19,7 @@ from bt_actions.importing.names import (
     in_sequence,
     input_name,
     node_name,
+    unique,
     value_of,
 )
 from bt_actions.importing.project import (
@@ -62,6 +63,7 @@ class Writer:
         self.words: dict[str, dict[str, Any]] = {"actions": {}, "topics": {}, "kinds": {}}
         self.imports: set[str] = set()
         self._inside: list[Definition] = [definition]
+        self._taken = {identifier(name) for name in definition.accesses}
 
     # The tree
 
@@ -132,6 +134,12 @@ class Writer:
                 word = identifier(name) if word in definition.accesses else word
                 scope.topics[name] = word if kind == "GoalUpdater" else f"{word}.data"
         return scope
+
+    def variable(self, word: str) -> str:
+        """Return the name of a new variable."""
+        name = unique(word, self._taken)
+        self._taken.add(name)
+        return name
 
     # A node
 

@@ -31,9 +31,9 @@ def test_a_tree_is_written_and_runs(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_what_is_refused_is_told_and_is_the_exit_code(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(tmp_path, "<ParallelAll><AlwaysSuccess/></ParallelAll>") == 1
+    assert run(tmp_path, "<SingleTrigger><AlwaysSuccess/></SingleTrigger>") == 1
     out, _ = capsys.readouterr()
-    assert out.startswith(f"{tmp_path / 'main.xml'}:3:1: node ParallelAll: refused: all children")
+    assert out.startswith(f"{tmp_path / 'main.xml'}:3:1: node SingleTrigger: refused: the node")
     assert "AlwaysSuccess: converted" not in out
 
 
