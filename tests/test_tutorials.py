@@ -24,6 +24,8 @@ BLOCK = re.compile(r"(?:`([^`\n]+)`:\n\n)?^```(\w+)\n(.*?)^```", re.MULTILINE | 
 
 PATIENCE = 900.0
 """Seconds for a build of messages on a machine that does other work besides."""
+TIDY = "trap 'kill $(jobs -p) 2> /dev/null || true' EXIT"
+"""Ends the servers of a block whose program failed."""
 Start = Callable[..., Process]
 CAN_BUILD = (Path(sys.prefix) / "share" / "rosidl_runtime_c" / "cmake").is_dir()
 
@@ -59,7 +61,7 @@ class Reader:
     def _run(self, block: str) -> None:
         """Type what a block of shell says."""
         done = subprocess.run(
-            ["bash", "-e", "-c", block],
+            ["bash", "-e", "-c", f"{TIDY}\n{block}"],
             cwd=self._where,
             env=self._environment,
             stdin=subprocess.DEVNULL,

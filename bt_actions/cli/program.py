@@ -76,8 +76,8 @@ def build_parser(only: str = "") -> Parser:
     """Return the parser of every command, or of `only` one."""
     parser = Parser(
         prog="bt-actions",
-        description="Run behaviour trees whose leaves are ROS 2 actions. Every goal is accounted "
-        "for: canceled and seen to its end, however the run ends.",
+        description="Run behaviour trees whose leaves are ROS 2 actions. A run tells how every "
+        "goal ended, or that the end is not known; cleanup cancels the goals of a killed run.",
         epilog=_EPILOG,
     )
     parser.add_argument(

@@ -47,7 +47,7 @@ def add_parser(subparsers: Subparsers) -> None:
         metavar="RUN",
         nargs="?",
         default="",
-        help="first letters of an id, name of a tree, .mcap file, or folder of a bag",
+        help="first letters of an id, name of a tree, .mcap file, or folder of a run or a bag",
     )
     parser.add_argument(
         "--port",

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from bt_actions.recording.reading import Recording
 
-RUN = "first letters of an id, name of a tree, .mcap file, or folder of a bag"
+RUN = "first letters of an id, name of a tree, .mcap file, or folder of a run or a bag"
 """The forms of RUN, for help."""
 _SOON = 0.5
 """Seconds that a user does not notice."""
