@@ -159,7 +159,7 @@ FIRST_MET = {
     "BT203": "`bt-actions interfaces show TYPE` has the fields",
     "BT205": "build the package ([interfaces.md](interfaces.md)), or source its workspace",
     "BT301": "give the action a `timeout`; without one the tree waits for a lost robot for ever",
-    "BT306": "leave `memory: false` away",
+    "BT306": "remove `memory: false`",
 }
 """The rules that beginners meet, and the remedy of each in a line."""
 

@@ -30,8 +30,9 @@ scenario only imitates a fault.
 READING = """\
 **How to read a row.** Each server writes a journal, with a line for each goal that it receives,
 accepts, cancels or finishes. The journal decides whether the scenario held ("–": no server took
-part). The outcome is the client's own view, with the end of the goal where the two differ. The time
-is the rounded time from the fault to the outcome, where the scenario measured it.
+part). The column outcome shows what the client reported, and also the end of the goal where the end
+differs. The time is the rounded time from the fault to the outcome, where the scenario measured it.
+The brackets after a name hold the parameters of the row.
 
 [promises.md](promises.md#what-cannot-be-known-from-outside) has the promises that no client can
 keep, and [reliability-settings.md](reliability-settings.md) the short lease for servers of your

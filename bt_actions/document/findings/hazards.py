@@ -59,7 +59,7 @@ HAZARDS = (
         tree("root:\n  sequence: Work\n  children: [{failure: Give up}, {success: Done}]\n"),
         tree("root:\n  sequence: Work\n  children: [{success: Done}, {failure: Give up}]\n"),
     ),
-    _warning("BT306", "a reactive composite begins a child again that takes time",
+    _warning("BT306", "a composite with 'memory: false' begins an action again that has ended",
         "A composite with 'memory: false' begins with its first child at each tick. So an action, "
         "a service or a wait that has succeeded begins again while a later child runs, and stops "
         "the later child, for ever. A child that may end at once, such as a fallback of a check "

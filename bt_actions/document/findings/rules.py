@@ -125,7 +125,7 @@ _RULES = (
         moving("inputs: {far: float64}\nroot:\n  move: Go\n  goal: {distance: {far}}\n"),
         moving("inputs: {far: float64}\nroot:\n  move: Go\n  goal: {distance: $far}\n"),
     ),
-    Rule("BT118", "[ or { ends a text inside { } and [ ]",
+    Rule("BT118", "an unquoted text inside { } or [ ] holds [ or {",
         "Inside { } and [ ], an unquoted '[' or '{' ends the text before it. Write the index with "
         "a dot, a variable without braces, or put the value in quotes.",
         moving("inputs: {d: 'float64[]'}\nroot:\n  move: Go\n  goal: {distance: $d[0]}\n"),
