@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,24 @@ def test_a_robot_charges_from_the_lower_threshold_to_the_upper(tmp_path: Path) -
     battery.publish(BatteryState(percentage=0.9))
     assert kitchen.runner.run() is Status.SUCCESS
     assert kitchen.outcomes()[3:] == ["There", "Back"]
+
+
+def test_a_round_that_a_while_leaves_in_the_middle_fails_no_patrol(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, round_of_it = RECIPES["hysteresis"].split("    else:\n")
+    around = "force_success: Or not\nchild:\n  while: $battery.percentage > 0.2\n  child:\n"
+    inside = around + textwrap.indent(textwrap.dedent(round_of_it), "    ")
+    left = before + "    else:\n" + textwrap.indent(inside, "      ")
+    monkeypatch.setitem(RECIPES, "hysteresis", left)
+    kitchen = Kitchen("hysteresis", tmp_path)
+    ScriptedServer(kitchen.network, MoveRobot, "move_robot", Script(duration=2.0))
+    battery = kitchen.network.publisher(BatteryState, "battery_state")
+    kitchen.runner.start()
+    for level in [0.5] * 3 + [0.1] * 6:
+        battery.publish(BatteryState(percentage=level))
+        assert kitchen.runner.advance(1.0) is None
+    assert kitchen.outcomes() == ["There: CANCELED", "Home"]
 
 
 @pytest.mark.parametrize(
