@@ -201,8 +201,8 @@ def came_out(records: Sequence[Record]) -> str:
     return (
         f"**What came out.** {text}.\n"
         f"In {unknown} the end of a goal was not known in time, and the run said UNKNOWN. "
-        f"In {twice} a second\nserver of one name executed a goal, too; it was canceled there, or "
-        "named.\n"
+        f"In {twice} a second\nserver of one name executed a goal, too; the run canceled or named "
+        "that goal.\n"
     )
 
 
