@@ -98,7 +98,10 @@ class Recorder:
                 self._let_go(run)
 
     def _is_burst(self) -> bool:
-        return any(run.reader.is_burst for run in list(self._runs))
+        runs = list(self._runs)  # a new one gets its folder at once: `place` waits for that
+        return all(run.is_begun.is_set() for run in runs) and any(
+            run.reader.is_burst for run in runs
+        )
 
     def _let_go(self, run: _Run) -> None:
         with self._lock:
@@ -141,12 +144,12 @@ class _Run:
         self._beat = 0.0
         self.first: Path | None = None
         """The first file, once the run has begun."""
-        self._is_begun = threading.Event()
+        self.is_begun = threading.Event()
         """Whether the place of the recording is known, or that there is none."""
 
     def place(self) -> str:
         """Return ``HOST:PATH`` of the first file, or ""; wait until the recorder has made it."""
-        self._is_begun.wait(PATIENCE_FOR_PLACE)
+        self.is_begun.wait(PATIENCE_FOR_PLACE)
         if self.first is None or self._began is None:
             return ""
         return f"{self._began.where.get('host', '')}:{self.first}"
@@ -175,7 +178,7 @@ class _Run:
             if isinstance(event, RunBegan) and self._began is None:
                 self._began = event
                 self._begin(event)
-                self._is_begun.set()
+                self.is_begun.set()
             self._take(event)
             time.sleep(0)  # a thread that waits for Python's lock is next
         writer = self._writer
